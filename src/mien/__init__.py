@@ -1,0 +1,1 @@
+"""mien: photographs to a textured head."""

@@ -1,0 +1,41 @@
+"""What can go wrong, in the user's terms. Every message is one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class MienError(Exception):
+    """Base of every error that mien raises on purpose."""
+
+
+class InputError(MienError, ValueError):
+    """A value the caller gave is not what was expected.
+
+    Attributes:
+        name: the argument, option or file at fault.
+        expected: what would have been accepted.
+        got: what was found instead.
+    """
+
+    def __init__(self, name: str | Path, expected: str, got: object) -> None:
+        self.name, self.expected, self.got = str(name), expected, str(got)
+        super().__init__(f"{self.name}: expected {expected}, got {self.got}")
+
+
+class FileFormatError(MienError):
+    """A file does not hold what its kind promises.
+
+    Attributes:
+        path: the file.
+        place: where in it (a key, a line, a frame), or "".
+        problem: what was expected and what was found.
+    """
+
+    def __init__(self, path: str | Path, problem: str, place: str = "") -> None:
+        self.path, self.place, self.problem = Path(path), place, problem
+        super().__init__(f"{path}: {place + ': ' if place else ''}{problem}")
+
+
+class EstimationError(MienError):
+    """The data cannot answer the question, whoever asks; the message says why."""
