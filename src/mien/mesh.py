@@ -92,7 +92,7 @@ class Mesh:
 
 def _check_indices(name: str, value: object, limit: int) -> Int[Array, "f 3"]:
     indices = check_array(name, value, (None, 3), dtype=np.int32)
-    if indices.size and not (0 <= indices.min() and indices.max() < limit):
+    if indices.size and not (indices.min() >= 0 and indices.max() < limit):
         raise InputError(
             name, f"indices from 0 to {limit - 1}", f"{indices.min()} to {indices.max()}"
         )
