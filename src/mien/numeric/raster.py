@@ -1,0 +1,220 @@
+"""Which triangle every pixel shows, and where in it.
+
+Pixel (column, row) is sampled at its centre (column + 0.5, row + 0.5). Edges are tested with the
+same arithmetic from both sides and the top-left rule, so that a point on an edge that two
+triangles share belongs to exactly one of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from mien.arrays import Array, Float, Int, check_array, check_positive, frozen
+from mien.errors import InputError
+from mien.numeric.threads import for_row_bands
+
+
+@dataclass(frozen=True)
+class Raster:
+    """What a camera sees of a mesh.
+
+    Attributes:
+        triangle_ids: (H, W) int32, -1 where there is no triangle.
+        barycentrics: (H, W, 3) float32, perspective-correct, summing to 1; zero outside.
+        depth: (H, W) float32, camera z; infinite outside.
+    """
+
+    triangle_ids: Int[Array, "h w"]
+    barycentrics: Float[Array, "h w 3"]
+    depth: Float[Array, "h w"]
+
+    @property
+    def mask(self) -> Array:
+        """(H, W) bool: where there is a triangle."""
+        inside: Array = self.triangle_ids >= 0
+        return inside
+
+
+def rasterize(
+    vertices_px: Float[Array, "v 2"],
+    depth: Float[Array, " v"],
+    triangles: Int[Array, "f 3"],
+    width: int,
+    height: int,
+    *,
+    cull: bool = False,
+) -> Raster:
+    """The nearest triangle at every pixel's centre; of several equally near, the first.
+
+    Args:
+        vertices_px: (V, 2) px.
+        depth: (V,) camera z; a triangle with a vertex at zero, behind it or not finite is skipped.
+        triangles: (F, 3) vertex indices, counter-clockwise as the camera sees their front.
+        width, height: px.
+        cull: leave out triangles seen from behind.
+    Raises: InputError: shapes, sizes, an index out of range.
+    """
+    for name, size in (("width", width), ("height", height)):
+        check_positive(name, size)
+    vertices_px = check_array("vertices_px", vertices_px, (None, 2), finite=False)
+    depth = check_array("depth", depth, (len(vertices_px),), finite=False)
+    triangles = check_triangles(triangles, len(vertices_px))
+    # The kernel fills these two, in its threads: touching fresh memory is most of the cost.
+    ids = np.empty((height, width), np.int32)
+    nearest = np.empty((height, width), np.float32)
+    barycentrics = np.zeros((height, width, 3), np.float32)
+    inputs = [frozen(np.ascontiguousarray(array)) for array in (vertices_px, depth, triangles)]
+
+    def rows(first: int, end: int) -> None:
+        _rasterize_rows(*inputs, cull, first, end, ids, barycentrics, nearest)
+
+    for_row_bands(rows, height, work=4 * len(triangles) + width * height)
+    return Raster(ids, barycentrics, nearest)
+
+
+def interpolate(
+    raster: Raster, triangles: Int[Array, "f 3"], values: Float[Array, "v c"]
+) -> Float[Array, "h w c"]:
+    """Values at the vertices, interpolated over the pixels: (H, W, C) float32, zero outside.
+
+    Raises: InputError: shapes, an index out of range.
+    """
+    values = check_array("values", values, (None, None), dtype=np.float32, finite=False)
+    triangles = check_triangles(triangles, len(values))
+    if raster.triangle_ids.max(initial=-1) >= len(triangles):
+        raise InputError("triangles", "those that were rasterised", f"only {len(triangles)}")
+    height, width = raster.triangle_ids.shape
+    out = np.zeros((height, width, values.shape[1]), np.float32)
+    arrays = (raster.triangle_ids, raster.barycentrics, triangles, values)
+    inputs = [frozen(np.ascontiguousarray(array)) for array in arrays]
+    for_row_bands(lambda a, b: _interpolate_rows(*inputs, a, b, out), height, work=width * height)
+    return out
+
+
+def check_triangles(triangles: object, vertices: int) -> Int[Array, "f 3"]:
+    """(F, 3) int32 indices below the number of vertices. Raises: InputError."""
+    indices = check_array("triangles", triangles, (None, 3), dtype=np.int32)
+    if indices.size and not (indices.min() >= 0 and indices.max() < vertices):
+        found = f"{indices.min()} to {indices.max()}"
+        raise InputError("triangles", f"indices from 0 to {vertices - 1}", found)
+    return indices
+
+
+@njit(cache=True, nogil=True)
+def _line(vertices_px: Array, i: int, j: int) -> tuple[float, float, float, float, float]:
+    """Origin and direction of the line i-j as both of its triangles compute it, and the sign.
+
+    The function sign * (dx * (y - y0) - dy * (x - x0)) is positive inside a triangle whose
+    corners turn the positive way (clockwise on the screen, as y points down).
+    """
+    sign = 1.0
+    if i > j:
+        i, j = j, i
+        sign = -1.0
+    x0, y0 = vertices_px[i, 0], vertices_px[i, 1]
+    return x0, y0, vertices_px[j, 0] - x0, vertices_px[j, 1] - y0, sign
+
+
+@njit(cache=True, nogil=True)
+def _owns_edge(dx: float, dy: float) -> bool:
+    """Whether a point exactly on the edge is inside: on top and left edges (y points down)."""
+    return dy < 0.0 or (dy == 0.0 and dx > 0.0)
+
+
+@njit(cache=True, nogil=True)
+def _rasterize_rows(
+    vertices_px: Array,
+    depth: Array,
+    triangles: Array,
+    cull: bool,
+    first: int,
+    end: int,
+    ids: Array,
+    barycentrics: Array,
+    nearest: Array,
+) -> None:
+    width = ids.shape[1]
+    ids[first:end] = -1
+    nearest[first:end] = np.inf
+    for t in range(triangles.shape[0]):
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        za, zb, zc = depth[i], depth[j], depth[k]
+        if not (za > 0.0 and zb > 0.0 and zc > 0.0 and za + zb + zc < np.inf):
+            continue
+        ax, ay = vertices_px[i, 0], vertices_px[i, 1]
+        bx, by = vertices_px[j, 0], vertices_px[j, 1]
+        cx, cy = vertices_px[k, 0], vertices_px[k, 1]
+        # Pixels whose centre lies in the bounding box; the comparisons also refuse NaN.
+        top = max(np.ceil(min(ay, by, cy) - 0.5), float(first))
+        bottom = min(np.floor(max(ay, by, cy) - 0.5), end - 1.0)
+        left = max(np.ceil(min(ax, bx, cx) - 0.5), 0.0)
+        right = min(np.floor(max(ax, bx, cx) - 0.5), width - 1.0)
+        if not (top <= bottom and left <= right):
+            continue
+        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+        if not (area < 0.0 or (area > 0.0 and not cull)):
+            continue
+        # Turned so that the corners go the positive way round.
+        if area < 0.0:
+            j, k = k, j
+            zb, zc = zc, zb
+        x0, y0, dx0, dy0, s0 = _line(vertices_px, j, k)
+        x1, y1, dx1, dy1, s1 = _line(vertices_px, k, i)
+        x2, y2, dx2, dy2, s2 = _line(vertices_px, i, j)
+        own0 = _owns_edge(s0 * dx0, s0 * dy0)
+        own1 = _owns_edge(s1 * dx1, s1 * dy1)
+        own2 = _owns_edge(s2 * dx2, s2 * dy2)
+        wa, wb, wc = 1.0 / za, 1.0 / zb, 1.0 / zc
+        for row in range(int(top), int(bottom) + 1):
+            y = row + 0.5
+            r0, r1, r2 = dx0 * (y - y0), dx1 * (y - y1), dx2 * (y - y2)
+            for col in range(int(left), int(right) + 1):
+                x = col + 0.5
+                e0 = s0 * (r0 - dy0 * (x - x0))
+                if e0 < 0.0 or (e0 == 0.0 and not own0):
+                    continue
+                e1 = s1 * (r1 - dy1 * (x - x1))
+                if e1 < 0.0 or (e1 == 0.0 and not own1):
+                    continue
+                e2 = s2 * (r2 - dy2 * (x - x2))
+                if e2 < 0.0 or (e2 == 0.0 and not own2):
+                    continue
+                # 1/z is linear on the screen.
+                p0, p1, p2 = e0 * wa, e1 * wb, e2 * wc
+                inverse = 1.0 / (p0 + p1 + p2)
+                z = np.float32((e0 + e1 + e2) * inverse)
+                if z < nearest[row, col]:
+                    nearest[row, col] = z
+                    ids[row, col] = t
+                    second, third = p1 * inverse, p2 * inverse
+                    if area < 0.0:
+                        second, third = third, second
+                    barycentrics[row, col, 0] = p0 * inverse
+                    barycentrics[row, col, 1] = second
+                    barycentrics[row, col, 2] = third
+
+
+@njit(cache=True, nogil=True)
+def _interpolate_rows(
+    ids: Array,
+    barycentrics: Array,
+    triangles: Array,
+    values: Array,
+    first: int,
+    end: int,
+    out: Array,
+) -> None:
+    for row in range(first, end):
+        for col in range(ids.shape[1]):
+            t = ids[row, col]
+            if t < 0:
+                continue
+            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            p0 = barycentrics[row, col, 0]
+            p1 = barycentrics[row, col, 1]
+            p2 = barycentrics[row, col, 2]
+            for c in range(values.shape[1]):
+                out[row, col, c] = p0 * values[i, c] + p1 * values[j, c] + p2 * values[k, c]

@@ -1,0 +1,42 @@
+"""Work on rows of an image, shared by threads; the result never depends on how many.
+
+The kernels are Numba functions compiled with `nogil`, called on bands of rows from a pool of
+Python threads. Numba's own `parallel=True` takes several times longer to compile, and its default
+threading layer must not be entered by two threads at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+
+import numba
+
+# Below this much work (pixels, roughly) waking a second thread costs more than it saves.
+_SERIAL_WORK = 20_000
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, thread_name_prefix="mien-rows")
+
+
+def for_row_bands(kernel: Callable[[int, int], object], rows: int, *, work: int) -> None:
+    """Call kernel(first_row, end_row) until all rows are done, in as many threads as Numba uses.
+
+    Args:
+        kernel: releases the GIL, and writes to its own rows only.
+        rows: how many there are.
+        work: about how many pixels it costs, to decide whether threads are worth waking.
+    """
+    threads = int(numba.get_num_threads())
+    if threads == 1 or work < _SERIAL_WORK:
+        kernel(0, rows)
+        return
+    # More bands than threads: an image's busy rows are seldom spread evenly.
+    bands = min(rows, 4 * threads)
+    edges = [rows * band // bands for band in range(bands + 1)]
+    tasks = [_pool(threads).submit(kernel, *edges[band : band + 2]) for band in range(bands)]
+    for task in tasks:
+        task.result()
