@@ -1,0 +1,152 @@
+"""The command line: parses, calls, prints. Nothing is computed here."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from mien.app.options import parse_amounts, parse_size
+from mien.app.progress import terminal_progress
+from mien.errors import MienError
+
+app = typer.Typer(
+    help="Photographs of a real person to a textured head.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, no bars.")]
+Output = Annotated[Path, typer.Option("-o", "--output", help="Where the result goes.")]
+HeadFolder = Annotated[Path, typer.Argument(help="A head folder that `mien build` made.")]
+
+
+@app.command()
+def demo(
+    output: Output = Path("mien-demo"),
+    json_: Json = False,
+) -> None:
+    """Build, render and export a head from the photos that ship with mien."""
+    from mien.app.demo import run_demo
+
+    with terminal_progress(json_) as progress:
+        index = run_demo(output, progress=progress)
+    _print(json_, {"index": str(index)}, f"Open {index} in a browser.")
+
+
+@app.command()
+def build(
+    source: Annotated[
+        Path, typer.Argument(help="A folder of photos (or of one folder an expression), a photo, a video.")
+    ],
+    output: Output,
+    adjust: Annotated[
+        bool, typer.Option(help="Adjust all cameras and points jointly after P02's five steps.")
+    ] = True,
+    curves: Annotated[
+        str, typer.Option(help="How drawn curves become points: epipolar or arc-length.")
+    ] = "epipolar",
+    kernel: Annotated[str, typer.Option(help="Radial basis of the shape's deformation.")] = "exponential",
+    fill: Annotated[str, typer.Option(help="Where no photo shows: pyramid or grow.")] = "pyramid",
+    texture_size: Annotated[int, typer.Option(help="Side of the texture atlas, px.")] = 2048,
+    interpupillary_mm: Annotated[float, typer.Option(help="Measured distance of the pupils.")] = 63.0,
+    face: Annotated[int | None, typer.Option(help="Which face, largest first, from 0.")] = None,
+    frames: Annotated[int, typer.Option(help="How many frames to pick from a video.")] = 7,
+    json_: Json = False,
+) -> None:
+    """Photos to a head folder: cameras, shape, texture and a report."""
+    from mien.build import BuildOptions, build_head_folder
+
+    options = BuildOptions(
+        adjust=adjust,
+        curves=curves,
+        kernel=kernel,
+        fill=fill,
+        texture_size=texture_size,
+        interpupillary_mm=interpupillary_mm,
+        face=face,
+        frames=frames,
+    )
+    with terminal_progress(json_) as progress:
+        summary = build_head_folder(source, output, options=options, progress=progress)
+    _print(json_, summary.to_json(), summary.to_text())
+
+
+@app.command()
+def render(
+    head: HeadFolder,
+    output: Output,
+    yaw: Annotated[float, typer.Option(help="Degrees; the head turns to its own left.")] = 0.0,
+    pitch: Annotated[float, typer.Option(help="Degrees; the head tips down.")] = 0.0,
+    roll: Annotated[float, typer.Option(help="Degrees; the head tips to its own right.")] = 0.0,
+    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in px.")] = "800x1000",
+    camera: Annotated[str | None, typer.Option(help="Reproduce the view of this photo.")] = None,
+    unit: Annotated[list[str] | None, typer.Option(help="A face unit, as jawOpen=0.5.")] = None,
+    background: Annotated[str | None, typer.Option(help="A colour, as #204060.")] = None,
+    json_: Json = False,
+) -> None:
+    """A picture of the head, with alpha."""
+    from mien.formats.head_folder import load_head
+    from mien.formats.image import save_image
+    from mien.render.picture import render_head
+
+    picture = render_head(
+        load_head(head),
+        yaw_deg=yaw,
+        pitch_deg=pitch,
+        roll_deg=roll,
+        size=parse_size("--size", size),
+        photo=camera,
+        units=parse_amounts("--unit", unit or []),
+        background=background,
+    )
+    save_image(output, picture)
+    _print(json_, {"output": str(output)}, str(output))
+
+
+@app.command()
+def export(head: HeadFolder, output: Output, json_: Json = False) -> None:
+    """The head as .glb, .obj or .usdz, face units included."""
+    from mien.formats.export import export_head
+    from mien.formats.head_folder import load_head
+
+    export_head(load_head(head), output)
+    _print(json_, {"output": str(output), "bytes": output.stat().st_size}, str(output))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line; the console script's entry point. Returns the exit status."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    debug = "--debug" in arguments
+    arguments = [argument for argument in arguments if argument != "--debug"]
+    try:
+        app(args=arguments, prog_name="mien", standalone_mode=False)
+    except (MienError, OSError) as error:
+        return _fail(error, debug)
+    except typer.Exit as stop:
+        return int(stop.exit_code)
+    except (typer.Abort, KeyboardInterrupt):
+        return 130
+    except Exception as error:
+        # Click's own complaints (an unknown option, a missing argument) carry an exit code;
+        # anything else is a bug and keeps its traceback only on request.
+        if hasattr(error, "format_message"):
+            return _fail(error.format_message(), debug)
+        return _fail(f"internal error: {type(error).__name__}: {error} (--debug shows where)", debug)
+    return 0
+
+
+def _fail(error: object, debug: bool) -> int:
+    if debug and isinstance(error, Exception):
+        raise error
+    print("error:", " ".join(str(error).split()), file=sys.stderr)
+    return 2
+
+
+def _print(as_json: bool, data: dict[str, Any], text: str) -> None:
+    print(json.dumps(data, indent=2) if as_json else text)

@@ -1,0 +1,27 @@
+"""Command-line values that are more than one number."""
+
+from __future__ import annotations
+
+from mien.errors import InputError
+
+
+def parse_size(name: str, text: str) -> tuple[int, int]:
+    """`800x1000` to (800, 1000). Raises: InputError."""
+    width, cross, height = text.lower().partition("x")
+    if not (cross and width.isdecimal() and height.isdecimal() and int(width) and int(height)):
+        raise InputError(name, "WIDTHxHEIGHT in px, as 800x1000", text)
+    return int(width), int(height)
+
+
+def parse_amounts(name: str, texts: list[str]) -> dict[str, float]:
+    """`["jawOpen=0.5"]` to {"jawOpen": 0.5}. Raises: InputError."""
+    amounts = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        try:
+            if not (key and equals):
+                raise ValueError
+            amounts[key] = float(value)
+        except ValueError:
+            raise InputError(name, "NAME=AMOUNT, as jawOpen=0.5", text) from None
+    return amounts

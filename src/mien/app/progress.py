@@ -1,0 +1,44 @@
+"""Progress bars on the terminal: one line a stage, with time left."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mien.build import Progress
+
+
+@contextmanager
+def terminal_progress(quiet: bool) -> Iterator[Progress]:
+    """A progress callback that draws bars on stderr while the block runs.
+
+    Args:
+        quiet: draw nothing.
+    Yields: a function of (stage, done, total); total 0 means "unknown, still at it".
+    """
+    if quiet:
+        yield lambda stage, done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bars
+
+    bars = Bars(
+        TextColumn("{task.description:<34}"),
+        BarColumn(bar_width=28),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+    )
+    tasks: dict[str, TaskID] = {}
+
+    def advance(stage: str, done: int, total: int) -> None:
+        if stage not in tasks:
+            tasks[stage] = bars.add_task(stage, total=total or None)
+        bars.update(tasks[stage], completed=done, total=total or None)
+
+    with bars:
+        yield advance
