@@ -104,24 +104,88 @@ def check_triangles(triangles: object, vertices: int) -> Int[Array, "f 3"]:
 
 
 @njit(cache=True, nogil=True)
-def _line(vertices_px: Array, i: int, j: int) -> tuple[float, float, float, float, float]:
-    """Origin and direction of the line i-j as both of its triangles compute it, and the sign.
+def _edge(vertices_px: Array, i: int, j: int) -> tuple[float, float, float, float, bool]:
+    """The line i-j as a (x - x0) + b (y - y0), positive inside; whether a point on it is inside.
 
-    The function sign * (dx * (y - y0) - dy * (x - x0)) is positive inside a triangle whose
-    corners turn the positive way (clockwise on the screen, as y points down).
+    Inside is to the right when walking from i to j with y pointing down. Both triangles at an
+    edge compute the same numbers with opposite signs, and zero at either end.
     """
-    sign = 1.0
-    if i > j:
-        i, j = j, i
-        sign = -1.0
-    x0, y0 = vertices_px[i, 0], vertices_px[i, 1]
-    return x0, y0, vertices_px[j, 0] - x0, vertices_px[j, 1] - y0, sign
+    low, high = min(i, j), max(i, j)
+    x0, y0 = vertices_px[low, 0], vertices_px[low, 1]
+    dx, dy = vertices_px[high, 0] - x0, vertices_px[high, 1] - y0
+    sign = 1.0 if i < j else -1.0
+    a, b = -sign * dy, sign * dx
+    return a, b, x0, y0, a > 0.0 or (a == 0.0 and b > 0.0)
 
 
 @njit(cache=True, nogil=True)
-def _owns_edge(dx: float, dy: float) -> bool:
-    """Whether a point exactly on the edge is inside: on top and left edges (y points down)."""
-    return dy < 0.0 or (dy == 0.0 and dx > 0.0)
+def _inside(a: float, x0: float, rest: float, closed: bool, col: int) -> bool:
+    e = a * (col + 0.5 - x0) + rest
+    return e > 0.0 or (closed and e == 0.0)
+
+
+@njit(cache=True, nogil=True)
+def _clip(a: float, x0: float, rest: float, closed: bool, left: int, right: int) -> tuple[int, int]:
+    """Of the columns from left to right, the first and the last inside an edge."""
+    if a == 0.0:
+        return (left, right) if _inside(a, x0, rest, closed, left) else (left, left - 1)
+    # Rounding can put the crossing on the wrong side of a centre, so the ends are tested.
+    crossing = min(max(x0 - rest / a - 0.5, left - 1.0), right + 1.0)
+    if a > 0.0:
+        left = max(left, int(np.floor(crossing)))
+        while left <= right and not _inside(a, x0, rest, closed, left):
+            left += 1
+    else:
+        right = min(right, int(np.ceil(crossing)))
+        while left <= right and not _inside(a, x0, rest, closed, right):
+            right -= 1
+    return left, right
+
+
+@njit(cache=True, nogil=True)
+def _fill_triangle(
+    vertices_px: Array,
+    depth: Array,
+    triangles: Array,
+    t: int,
+    flip: bool,
+    box: tuple[int, int, int, int],
+    ids: Array,
+    barycentrics: Array,
+    nearest: Array,
+) -> None:
+    """Write triangle t where it is the nearest so far.
+
+    Args:
+        flip: its corners go counter-clockwise on the screen, as those of a front do.
+        box: first and last row, first and last column that it can reach.
+    """
+    second, third = (2, 1) if flip else (1, 2)
+    i, j, k = triangles[t, 0], triangles[t, second], triangles[t, third]
+    a0, b0, x0, y0, closed0 = _edge(vertices_px, j, k)
+    a1, b1, x1, y1, closed1 = _edge(vertices_px, k, i)
+    a2, b2, x2, y2, closed2 = _edge(vertices_px, i, j)
+    wi, wj, wk = 1.0 / depth[i], 1.0 / depth[j], 1.0 / depth[k]
+    top, bottom, box_left, box_right = box
+    for row in range(top, bottom + 1):
+        y = row + 0.5
+        r0, r1, r2 = b0 * (y - y0), b1 * (y - y1), b2 * (y - y2)
+        left, right = _clip(a0, x0, r0, closed0, box_left, box_right)
+        left, right = _clip(a1, x1, r1, closed1, left, right)
+        left, right = _clip(a2, x2, r2, closed2, left, right)
+        for col in range(left, right + 1):
+            x = col + 0.5
+            e0, e1, e2 = a0 * (x - x0) + r0, a1 * (x - x1) + r1, a2 * (x - x2) + r2
+            # 1/z is linear on the screen.
+            p0, p1, p2 = e0 * wi, e1 * wj, e2 * wk
+            inverse = 1.0 / (p0 + p1 + p2)
+            z = np.float32((e0 + e1 + e2) * inverse)
+            if z < nearest[row, col]:
+                nearest[row, col] = z
+                ids[row, col] = t
+                barycentrics[row, col, 0] = p0 * inverse
+                barycentrics[row, col, second] = p1 * inverse
+                barycentrics[row, col, third] = p2 * inverse
 
 
 @njit(cache=True, nogil=True)
@@ -136,7 +200,7 @@ def _rasterize_rows(
     barycentrics: Array,
     nearest: Array,
 ) -> None:
-    width = ids.shape[1]
+    """Write every triangle into rows first to end - 1."""
     ids[first:end] = -1
     nearest[first:end] = np.inf
     for t in range(triangles.shape[0]):
@@ -151,50 +215,15 @@ def _rasterize_rows(
         top = max(np.ceil(min(ay, by, cy) - 0.5), float(first))
         bottom = min(np.floor(max(ay, by, cy) - 0.5), end - 1.0)
         left = max(np.ceil(min(ax, bx, cx) - 0.5), 0.0)
-        right = min(np.floor(max(ax, bx, cx) - 0.5), width - 1.0)
+        right = min(np.floor(max(ax, bx, cx) - 0.5), ids.shape[1] - 1.0)
         if not (top <= bottom and left <= right):
             continue
+        box = (int(top), int(bottom), int(left), int(right))
         area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-        if not (area < 0.0 or (area > 0.0 and not cull)):
-            continue
-        # Turned so that the corners go the positive way round.
-        if area < 0.0:
-            j, k = k, j
-            zb, zc = zc, zb
-        x0, y0, dx0, dy0, s0 = _line(vertices_px, j, k)
-        x1, y1, dx1, dy1, s1 = _line(vertices_px, k, i)
-        x2, y2, dx2, dy2, s2 = _line(vertices_px, i, j)
-        own0 = _owns_edge(s0 * dx0, s0 * dy0)
-        own1 = _owns_edge(s1 * dx1, s1 * dy1)
-        own2 = _owns_edge(s2 * dx2, s2 * dy2)
-        wa, wb, wc = 1.0 / za, 1.0 / zb, 1.0 / zc
-        for row in range(int(top), int(bottom) + 1):
-            y = row + 0.5
-            r0, r1, r2 = dx0 * (y - y0), dx1 * (y - y1), dx2 * (y - y2)
-            for col in range(int(left), int(right) + 1):
-                x = col + 0.5
-                e0 = s0 * (r0 - dy0 * (x - x0))
-                if e0 < 0.0 or (e0 == 0.0 and not own0):
-                    continue
-                e1 = s1 * (r1 - dy1 * (x - x1))
-                if e1 < 0.0 or (e1 == 0.0 and not own1):
-                    continue
-                e2 = s2 * (r2 - dy2 * (x - x2))
-                if e2 < 0.0 or (e2 == 0.0 and not own2):
-                    continue
-                # 1/z is linear on the screen.
-                p0, p1, p2 = e0 * wa, e1 * wb, e2 * wc
-                inverse = 1.0 / (p0 + p1 + p2)
-                z = np.float32((e0 + e1 + e2) * inverse)
-                if z < nearest[row, col]:
-                    nearest[row, col] = z
-                    ids[row, col] = t
-                    second, third = p1 * inverse, p2 * inverse
-                    if area < 0.0:
-                        second, third = third, second
-                    barycentrics[row, col, 0] = p0 * inverse
-                    barycentrics[row, col, 1] = second
-                    barycentrics[row, col, 2] = third
+        if area < 0.0 or (area > 0.0 and not cull):
+            _fill_triangle(
+                vertices_px, depth, triangles, t, area < 0.0, box, ids, barycentrics, nearest
+            )
 
 
 @njit(cache=True, nogil=True)
