@@ -1,0 +1,158 @@
+"""`head.json`: everything about a head that is not an array or a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import PurePosixPath
+from typing import Any, TypeVar
+
+from mien.arrays import Array, check_array
+from mien.camera import Camera
+from mien.model.head import FittedView, Head
+
+FORMAT = "mien head"
+VERSION = 1
+
+Json = dict[str, Any]
+Kind = TypeVar("Kind")
+
+
+class Broken(Exception):
+    """A key that is missing or holds something else; the reader adds the file's name."""
+
+    def __init__(self, place: str, problem: str) -> None:
+        self.place, self.problem = place, problem
+        super().__init__(f"{place}: {problem}")
+
+
+def head_to_json(head: Head, photo_files: Mapping[str, str]) -> Json:
+    """The contents of head.json.
+
+    Args:
+        photo_files: where in the folder each photo's pixels are, by the photo's name.
+    """
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "generator": head.generator,
+        "subject": head.subject,
+        "units": {
+            "length": "mm",
+            "axes": "x to the subject's left, y up, z out of the face",
+            "pixels": "origin at the top-left corner, centre of the first pixel at (0.5, 0.5)",
+        },
+        "parts": list(head.mesh.part_names),
+        "expressions": {
+            name: {
+                "texture": expression.texture,
+                "cameras": [_view_to_json(view) for view in expression.views],
+            }
+            for name, expression in head.expressions.items()
+        },
+        "textures": {name: f"textures/{name}.png" for name in head.textures},
+        "photos": dict(photo_files),
+        "left_out": dict(head.left_out),
+        "face_units": list(head.unit_names),
+    }
+
+
+def check_version(data: Json) -> None:
+    """Raises: Broken: not a head's, or from a version of mien newer than this one."""
+    if data.get("format") != FORMAT:
+        raise Broken("format", f"expected {FORMAT!r}, found {data.get('format')!r}")
+    version = get(data, "version", int)
+    if version > VERSION:
+        raise Broken(
+            "version",
+            f"{version} was written by a newer mien ({data.get('generator', 'unknown')}); "
+            f"this one reads up to {VERSION}",
+        )
+
+
+def get(data: Json, key: str, kind: type[Kind], place: str = "") -> Kind:
+    """data[key], which must be of this kind. Raises: Broken."""
+    where = f"{place}.{key}" if place else key
+    if key not in data:
+        raise Broken(where, "missing")
+    value = data[key]
+    if kind is float and isinstance(value, int):
+        value = float(value)
+    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+        raise Broken(where, f"expected {_KIND_NAMES[kind]}, found {str(value)[:40]!r}")
+    return value
+
+
+def get_texts(data: Json, key: str, place: str = "") -> dict[str, str]:
+    """data[key], an object whose values are text. Raises: Broken."""
+    texts = get(data, key, dict, place)
+    return {name: get(texts, name, str, key) for name in texts}
+
+
+def get_path(data: Json, key: str, place: str = "") -> str:
+    """data[key], a path that stays inside the folder. Raises: Broken."""
+    path = get(data, key, str, place)
+    if not is_inside(path):
+        raise Broken(f"{place}.{key}", f"expected a path inside the folder, found {path!r}")
+    return path
+
+
+def is_inside(path: str) -> bool:
+    """Whether a relative path, with forward slashes, leads to somewhere below its folder."""
+    plain = PurePosixPath(path)
+    return bool(path) and not plain.is_absolute() and ".." not in plain.parts and "\\" not in path
+
+
+def views_from_json(data: Json, expression: str) -> tuple[FittedView, ...]:
+    """The cameras of one expression. Raises: Broken; InputError: a camera that is none."""
+    place = f"expressions.{expression}.cameras"
+    items = get(get(data, expression, dict, "expressions"), "cameras", list, place[:-8])
+    return tuple(_view_from_json(item, f"{place}[{i}]") for i, item in enumerate(items))
+
+
+def _view_to_json(view: FittedView) -> Json:
+    camera = view.camera
+    return {
+        "photo": view.photo,
+        "width": camera.width,
+        "height": camera.height,
+        "focal_px": camera.focal_px,
+        "principal_px": camera.principal.tolist(),
+        "R_cam_head": camera.R_cam_head.tolist(),
+        "t_cam_head_mm": camera.t_cam_head.tolist(),
+        "rms_px": float(view.rms_px),
+        "points_used": int(view.points_used),
+        "distrusted": dict(view.distrusted),
+    }
+
+
+def _view_from_json(item: object, place: str) -> FittedView:
+    if not isinstance(item, dict):
+        raise Broken(place, "expected an object")
+    camera = Camera(
+        width=get(item, "width", int, place),
+        height=get(item, "height", int, place),
+        focal_px=get(item, "focal_px", float, place),
+        R_cam_head=_get_array(item, "R_cam_head", (3, 3), place),
+        t_cam_head=_get_array(item, "t_cam_head_mm", (3,), place),
+        principal_px=_get_array(item, "principal_px", (2,), place),
+    )
+    return FittedView(
+        photo=get(item, "photo", str, place),
+        camera=camera,
+        rms_px=get(item, "rms_px", float, place),
+        points_used=get(item, "points_used", int, place),
+        distrusted=get_texts(item, "distrusted", place),
+    )
+
+
+def _get_array(data: Json, key: str, shape: tuple[int, ...], place: str) -> Array:
+    return check_array(f"{place}.{key}", get(data, key, list, place), shape)
+
+
+_KIND_NAMES: dict[type, str] = {
+    int: "a whole number",
+    float: "a number",
+    str: "text",
+    list: "a list",
+    dict: "an object",
+}

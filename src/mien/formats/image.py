@@ -1,0 +1,78 @@
+"""Pictures to and from files: one way for all of mien's output."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+
+from mien.arrays import Array, UInt8
+from mien.errors import FileFormatError, InputError
+from mien.formats.atomic import atomic_file
+
+_KINDS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
+_MODES = {3: "RGB", 4: "RGBA"}
+
+
+def image_kind(path: str | Path) -> str:
+    """ "PNG" or "JPEG", by suffix. Raises: InputError: any other."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in _KINDS:
+        raise InputError(path, f"a name that ends in {', '.join(_KINDS)}", suffix or "no suffix")
+    return _KINDS[suffix]
+
+
+def save_image(path: str | Path, pixels: UInt8[Array, "h w c"], *, quality: int = 95) -> None:
+    """Write a picture, whole or not at all; the suffix tells the kind.
+
+    Args:
+        pixels: (h, w, 3) sRGB or (h, w, 4) with alpha last, not premultiplied.
+        quality: of a JPEG, 1 to 100.
+    Raises: InputError: an unknown suffix, transparency into a JPEG, a place that cannot be written.
+    """
+    kind = image_kind(path)
+    if kind == "JPEG" and pixels.ndim == 3 and pixels.shape[2] == 4:
+        if pixels[..., 3].min(initial=255) < 255:
+            raise InputError(path, "a .png for a picture with transparency", Path(path).suffix)
+        pixels = pixels[..., :3]
+    data = encode_image(pixels, kind, quality=quality)
+    with atomic_file(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def encode_image(pixels: UInt8[Array, "h w c"], kind: str, *, quality: int = 95) -> bytes:
+    """The bytes of a "PNG" or "JPEG" file; the same pixels give the same bytes.
+
+    JPEGs keep full colour resolution: halved chroma bleeds the lips into the skin around them.
+    """
+    from PIL import Image
+
+    if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] not in _MODES:
+        raise InputError(
+            "pixels", "an (h, w, 3 or 4) uint8 image", f"shape {pixels.shape}, {pixels.dtype}"
+        )
+    stream = io.BytesIO()
+    image = Image.fromarray(np.ascontiguousarray(pixels))
+    if kind == "JPEG":
+        image.save(stream, "JPEG", quality=quality, subsampling=0, optimize=True)
+    else:
+        # Level 3 is three times as fast as the default and loses little on photographs.
+        image.save(stream, "PNG", compress_level=3)
+    return stream.getvalue()
+
+
+def load_image(path: str | Path) -> UInt8[Array, "h w 3"]:
+    """An image that mien wrote, as (h, w, 3) sRGB. Raises: FileFormatError: missing, not readable.
+
+    Photos of unknown making are read by `mien.capture` instead.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as image:
+            return np.asarray(image.convert("RGB"))
+    except FileNotFoundError:
+        raise FileFormatError(path, "there is no such file") from None
+    except (UnidentifiedImageError, OSError, SyntaxError, Image.DecompressionBombError) as error:
+        raise FileFormatError(path, f"not a readable image ({error})") from error

@@ -1,0 +1,273 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mien.errors import FileFormatError, InputError
+from mien.formats.head_folder import check_head_place, load_head, save_head
+from mien.formats.head_json import VERSION
+from mien.model.head import Head
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def photos(*names: str) -> list[tuple[str, np.ndarray]]:
+    return [(name, np.full((8, 6, 3), 40 * i, np.uint8)) for i, name in enumerate(names, 1)]
+
+
+def edit_json(folder: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    path = folder / "head.json"
+    data = json.loads(path.read_text("utf-8"))
+    change(data)
+    path.write_text(json.dumps(data), "utf-8")
+
+
+@pytest.fixture
+def saved(small_head: Head, tmp_path: Path) -> Path:
+    save_head(small_head, tmp_path / "head")
+    return tmp_path / "head"
+
+
+def test_what_is_saved_comes_back(small_head: Head, saved: Path) -> None:
+    loaded = load_head(saved)
+    for name in ("subject", "unit_names", "left_out", "generator"):
+        assert getattr(loaded, name) == getattr(small_head, name)
+    for name in ("vertices", "triangles", "uvs", "uv_triangles", "part"):
+        np.testing.assert_array_equal(getattr(loaded.mesh, name), getattr(small_head.mesh, name))
+    assert loaded.mesh.part_names == small_head.mesh.part_names
+    np.testing.assert_array_equal(loaded.units, small_head.units)
+    np.testing.assert_array_equal(loaded.uncertainty_mm, small_head.uncertainty_mm)
+    for name, texture in small_head.textures.items():
+        np.testing.assert_array_equal(loaded.textures[name], texture)
+    for name, expression in small_head.expressions.items():
+        np.testing.assert_array_equal(loaded.expressions[name].vertices, expression.vertices)
+        assert loaded.expressions[name].texture == expression.texture
+
+
+def test_cameras_come_back_to_the_last_bit(small_head: Head, saved: Path) -> None:
+    for loaded, view in zip(load_head(saved).views, small_head.views, strict=True):
+        for name in ("width", "height", "focal_px"):
+            assert getattr(loaded.camera, name) == getattr(view.camera, name)
+        for name in ("R_cam_head", "t_cam_head", "principal_px"):
+            np.testing.assert_array_equal(getattr(loaded.camera, name), getattr(view.camera, name))
+        assert (loaded.photo, loaded.rms_px, loaded.points_used, loaded.distrusted) == (
+            view.photo,
+            view.rms_px,
+            view.points_used,
+            view.distrusted,
+        )
+
+
+def test_the_folder_is_readable_without_mien(small_head: Head, tmp_path: Path) -> None:
+    save_head(small_head, tmp_path / "h", photos=photos("front.png", "joy/front.heic"))
+    data = json.loads((tmp_path / "h" / "head.json").read_text("utf-8"))
+    camera = data["expressions"]["neutral"]["cameras"][0]
+    assert set(camera) >= {
+        "photo",
+        "width",
+        "height",
+        "focal_px",
+        "principal_px",
+        "R_cam_head",
+        "t_cam_head_mm",
+        "rms_px",
+        "points_used",
+    }
+    with np.load(tmp_path / "h" / "geometry.npz", allow_pickle=False) as arrays:
+        kinds = {name: (arrays[name].dtype.name, arrays[name].shape) for name in arrays.files}
+    count, faces, corners = (
+        len(array)
+        for array in (small_head.mesh.vertices, small_head.mesh.triangles, small_head.mesh.uvs)
+    )
+    assert kinds == {
+        "vertices/neutral": ("float32", (count, 3)),
+        "vertices/joy": ("float32", (count, 3)),
+        "triangles": ("int32", (faces, 3)),
+        "uvs": ("float32", (corners, 2)),
+        "uv_triangles": ("int32", (faces, 3)),
+        "part": ("uint8", (faces,)),
+        "uncertainty_mm": ("float32", (count,)),
+        "unit_offsets": ("float32", (3, count, 3)),
+    }
+    for place in [*data["textures"].values(), *data["photos"].values()]:
+        Image.open(tmp_path / "h" / place).verify()
+
+
+def test_photos_and_annotations_are_kept(small_head: Head, tmp_path: Path) -> None:
+    annotation = {"photo": "front.png", "size": [6, 8], "points": {"nose_tip": [3.5, 4]}}
+    save_head(
+        small_head,
+        tmp_path / "h",
+        photos=photos("front.png", "joy/front.heic"),
+        annotations={"front": annotation, "joy/front": {"points": {}}},
+    )
+    data = json.loads((tmp_path / "h" / "head.json").read_text("utf-8"))
+    assert data["photos"] == {
+        "front.png": "photos/front.png",
+        "joy/front.heic": "photos/joy/front.heic.jpg",
+    }
+    front = np.asarray(Image.open(tmp_path / "h" / "photos" / "front.png"))
+    np.testing.assert_array_equal(front, np.full((8, 6, 3), 40))
+    kept = json.loads((tmp_path / "h" / "annotations" / "front.json").read_text("utf-8"))
+    assert kept == annotation
+    assert (tmp_path / "h" / "annotations" / "joy" / "front.json").is_file()
+
+
+@pytest.mark.parametrize("name", ["../x.png", "/x.png", "a\\..\\x.png", ""])
+def test_a_photo_cannot_leave_the_folder(small_head: Head, tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match="photos: expected names that stay inside the folder"):
+        save_head(small_head, tmp_path / "h", photos=photos(name))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_same_head_gives_the_same_bytes(small_head: Head, tmp_path: Path) -> None:
+    for name in "ab":
+        save_head(small_head, tmp_path / name, photos=photos("front.png", "side.jpg"))
+    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+    # Archive members carry a date; it must not be today's.
+    assert b"PK\x03\x04" in (tmp_path / "a" / "geometry.npz").read_bytes()[:4]
+
+
+def test_a_loaded_head_saves_to_the_same_bytes(saved: Path, tmp_path: Path) -> None:
+    save_head(load_head(saved), tmp_path / "again")
+    assert contents(tmp_path / "again") == contents(saved)
+
+
+def test_a_failed_save_leaves_the_old_head(small_head: Head, saved: Path) -> None:
+    before = contents(saved)
+
+    def failing() -> Any:
+        yield from photos("front.png")
+        raise RuntimeError("the photo went away")
+
+    with pytest.raises(RuntimeError, match="went away"):
+        save_head(small_head, saved, photos=failing())
+    assert contents(saved) == before
+    assert [path.name for path in saved.parent.iterdir()] == ["head"]
+
+
+def test_saving_again_replaces_the_whole_folder(small_head: Head, saved: Path) -> None:
+    (saved / "photos").mkdir()
+    (saved / "photos" / "of_the_last_build.png").write_bytes(b"")
+    save_head(small_head, saved)
+    assert not (saved / "photos").exists()
+    assert [path.name for path in saved.parent.iterdir()] == ["head"]
+
+
+def test_a_folder_of_something_else_is_never_replaced(small_head: Head, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    for refuse in (lambda: save_head(small_head, tmp_path), lambda: check_head_place(tmp_path)):
+        with pytest.raises(InputError, match="a folder with other things in it"):
+            refuse()
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"format": "other"}'])
+def test_a_folder_with_some_other_head_json_is_never_replaced(
+    small_head: Head, tmp_path: Path, text: str
+) -> None:
+    (tmp_path / "head.json").write_text(text)
+    with pytest.raises(InputError, match="a folder with other things in it"):
+        save_head(small_head, tmp_path)
+    assert (tmp_path / "head.json").read_text() == text
+
+
+def test_a_newer_head_is_refused_and_says_so(saved: Path) -> None:
+    edit_json(saved, lambda data: data.update(version=VERSION + 1, generator="mien 9.0"))
+    with pytest.raises(FileFormatError, match=r"head\.json: version: 2 .*newer mien \(mien 9.0\)"):
+        load_head(saved)
+    check_head_place(saved)  # but it is a head folder, so that a new build may replace it
+
+
+def test_no_folder(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"expected a head folder .* got nothing at that place"):
+        load_head(tmp_path / "absent")
+    with pytest.raises(FileFormatError, match="is this a head folder"):
+        load_head(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        ("head.json", "head.json: there is no such file"),
+        ("geometry.npz", "geometry.npz: there is no such file"),
+        ("textures/atlas.png", "atlas.png: there is no such file"),
+    ],
+)
+def test_a_missing_file_is_named(saved: Path, file: str, message: str) -> None:
+    (saved / file).unlink()
+    with pytest.raises(FileFormatError, match=message):
+        load_head(saved)
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        ("head.json", r"head\.json: line \d+: "),
+        ("geometry.npz", r"geometry\.npz: not a readable \.npz file"),
+        ("textures/atlas.png", r"atlas\.png: not a readable image"),
+    ],
+)
+@pytest.mark.parametrize("keep", [0.0, 0.5])
+def test_a_truncated_file_is_named(saved: Path, file: str, message: str, keep: float) -> None:
+    data = (saved / file).read_bytes()
+    (saved / file).write_bytes(data[: int(keep * len(data))])
+    with pytest.raises(FileFormatError, match=message):
+        load_head(saved)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda data: data.update(format="mien track"), "format: expected 'mien head'"),
+        (lambda data: data.update(version="one"), "version: expected a whole number"),
+        (lambda data: data.pop("subject"), "subject: missing"),
+        (lambda data: data["expressions"].pop("neutral"), "expressions.neutral: missing"),
+        (lambda data: data["face_units"].pop(), "unit_offsets: expected shape"),
+        (lambda data: data["textures"].update(atlas=3), "textures.atlas: expected text"),
+        (
+            lambda data: data["expressions"]["joy"]["cameras"][0].pop("focal_px"),
+            r"expressions\.joy\.cameras\[0\]\.focal_px: missing",
+        ),
+        (
+            lambda data: data["expressions"]["joy"]["cameras"][0].update(R_cam_head=[[1, 0], [0]]),
+            r"cameras\[0\]\.R_cam_head: expected numbers of shape \(3, 3\)",
+        ),
+        (
+            lambda data: data["expressions"]["joy"]["cameras"][0].update(focal_px=-1),
+            "focal_px: expected a number above zero",
+        ),
+        (
+            lambda data: data["expressions"].update(awe={"texture": "atlas", "cameras": []}),
+            r"geometry\.npz: vertices/awe: missing",
+        ),
+        (
+            lambda data: data["textures"].update(atlas="../../secret.png"),
+            "textures.atlas: expected a path inside the folder",
+        ),
+    ],
+)
+def test_a_wrong_entry_is_named(
+    saved: Path, change: Callable[[dict[str, Any]], object], message: str
+) -> None:
+    edit_json(saved, change)
+    with pytest.raises(FileFormatError, match=message):
+        load_head(saved)
+
+
+def test_pickled_arrays_are_never_read(saved: Path) -> None:
+    with np.load(saved / "geometry.npz") as file:
+        arrays = dict(file)
+    arrays["part"] = np.array([{"a": 1}], dtype=object)
+    np.savez(saved / "geometry.npz", **arrays)
+    with pytest.raises(FileFormatError, match=r"geometry\.npz: not a readable .*allow_pickle"):
+        load_head(saved)
