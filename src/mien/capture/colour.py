@@ -1,0 +1,67 @@
+"""Pillow images of every mode and colour profile as 8-bit sRGB."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+
+def to_eight_bits(image: Image, notes: list[str]) -> Image:
+    """The picture in mode L, RGB, CMYK or LAB: 8 bits a sample, no palette, no alpha.
+
+    Raises: ValueError: samples whose range is unknown (floating point).
+    """
+    from PIL import Image
+
+    if image.mode in ("L", "RGB", "CMYK", "LAB"):
+        return image
+    if image.mode.startswith("I"):
+        # 16-bit grey; 65535 is white, and 65535 / 257 is 255.
+        samples = np.clip(np.asarray(image), 0, 65535).astype(np.uint16)
+        notes.append("16-bit grey: reduced to 8 bits")
+        return Image.fromarray((samples // 257).astype(np.uint8))
+    if image.mode == "F":
+        raise ValueError("floating-point samples; save the photo with 8 or 16 bits")
+    if image.mode in ("RGBA", "RGBa", "LA", "La", "PA") or "transparency" in image.info:
+        return _without_alpha(image, notes)
+    return image.convert("L" if image.mode == "1" else "RGB")
+
+
+def _without_alpha(image: Image, notes: list[str]) -> Image:
+    """Composited onto white, what most viewers show behind a cut-out."""
+    from PIL import Image
+
+    rgba = image.convert("RGBA")
+    if rgba.getchannel("A").getextrema()[0] == 255:
+        return rgba.convert("RGB")
+    notes.append("transparent parts are shown on white")
+    white = Image.new("RGBA", rgba.size, "white")
+    white.alpha_composite(rgba)
+    return white.convert("RGB")
+
+
+def to_srgb(image: Image, profile: bytes | None, notes: list[str]) -> Image:
+    """Mode RGB; samples converted through the file's colour profile where it has another one."""
+    from PIL import ImageCms
+
+    if profile:
+        try:
+            source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
+            name = ImageCms.getProfileDescription(source).strip()
+            if "sRGB" not in name:
+                converted = ImageCms.profileToProfile(
+                    image, source, ImageCms.createProfile("sRGB"), outputMode="RGB"
+                )
+                assert converted is not None
+                notes.append(f"colours converted from {name or 'an unnamed profile'} to sRGB")
+                return converted
+        except ImageCms.PyCMSError:
+            notes.append("its colour profile is damaged or of another kind: taken as sRGB")
+    elif image.mode == "CMYK":
+        notes.append("CMYK without a colour profile: colours are approximate")
+    return image if image.mode == "RGB" else image.convert("RGB")

@@ -1,0 +1,250 @@
+"""Finds the face in a photo: small, turned on its side, or one of several."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from mien.arrays import Array, UInt8
+from mien.assets.detector import detector_model_path
+from mien.capture.landmarks import Landmarks, facing_confidence
+from mien.capture.mediapipe_face import DetectedFace, FaceNetwork
+from mien.capture.photos import Photo
+from mien.errors import EstimationError, InputError
+
+RIGHT_IRIS, LEFT_IRIS = 468, 473
+
+MIN_EYE_DISTANCE_PX = 20.0
+"""Below this landmarks are off by more than 3.5 % of the distance between the eyes."""
+
+GOOD_EYE_DISTANCE_PX = 60.0
+"""From here on they are good to 1 % of it; more pixels add little."""
+
+_SEARCH_SIDE = 1280
+_CROP_WIDTHS = 1.5
+_CROP_SIDE = 768
+_STEADY = 0.02
+_QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+class LandmarkDetector:
+    """Finds a face and its landmarks. Use as a context manager, or call `close`.
+
+    Raises: MienError: a shared library of the system is missing; says which.
+    """
+
+    def __init__(self) -> None:
+        self._network = FaceNetwork(detector_model_path())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release the network."""
+        self._network.close()
+
+    def detect(self, photo: Photo, *, face: int | None = None) -> Landmarks:
+        """The landmarks of the largest face, or of the one asked for.
+
+        The network sees a reduced photo first and then the face alone at good resolution: for a
+        face under a tenth of the photo's width that is the difference between 12 % and 0.5 % of
+        the distance between the eyes; for larger ones it changes nothing. The shift between both
+        passes tells a face from a mistaken one, as do photos that lie on their side.
+
+        Args:
+            photo: upright as far as its file tells.
+            face: which one, counted from 1 from left to right in the photo.
+        Raises:
+            InputError: `face` is not positive, or there are fewer faces.
+            EstimationError: no face, or one too small.
+        """
+        if face is not None and face < 1:
+            raise InputError("face", "a number from 1 on", face)
+        sight = self._best_sight(photo, face)
+        if sight is None:
+            raise EstimationError(
+                f"{photo.name}: no face found; one must look within about 50 degrees of the camera"
+                " and fill a twentieth of the photo's width"
+            )
+        return _landmarks(photo.name, sight)
+
+    def detect_fast(self, pixels: UInt8[Array, "h w 3"]) -> DetectedFace | None:
+        """The largest face after a single pass, upright only: for the frames of a video."""
+        return max(self._network.faces(pixels), key=lambda found: found.width, default=None)
+
+    def _best_sight(self, photo: Photo, face: int | None) -> _Sight | None:
+        """The photo as it stands, in parts, then turned, until a face holds still."""
+        upright = self._look(photo, face) or self._look_in_parts(photo, face)
+        if upright is not None and upright.steady:
+            return upright
+        turned = (self._look(photo, face, quarters) for quarters in (1, 3, 2))
+        best = min(
+            (sight for sight in turned if sight is not None),
+            key=lambda sight: sight.shift,
+            default=None,
+        )
+        if best is None or (upright is not None and best.shift > upright.shift / 2):
+            return upright
+        return best
+
+    def _look(self, photo: Photo, face: int | None, quarters: int = 0) -> _Sight | None:
+        """The face in the photo turned by quarters counterclockwise, in the photo's own pixels."""
+        pixels = np.rot90(photo.pixels, quarters)
+        small = _shrunk(pixels, _SEARCH_SIDE)
+        faces = self._network.faces(small)
+        factor = pixels.shape[1] / small.shape[1]
+        return self._refine(photo, [_moved(found, factor) for found in faces], face, quarters)
+
+    def _look_in_parts(self, photo: Photo, face: int | None) -> _Sight | None:
+        """A face too small to be seen in the whole: nine overlapping halves."""
+        height, width = photo.pixels.shape[:2]
+        faces: list[DetectedFace] = []
+        for top in (0, height // 4, height // 2):
+            for left in (0, width // 4, width // 2):
+                part = photo.pixels[top : top + height // 2, left : left + width // 2]
+                small = _shrunk(part, _SEARCH_SIDE // 2)
+                factor = part.shape[1] / small.shape[1]
+                for found in self._network.faces(small):
+                    moved = _moved(found, factor, (left, top))
+                    if not any(_same_place(moved, other) for other in faces):
+                        faces.append(moved)
+        return self._refine(photo, faces, face, 0)
+
+    def _refine(
+        self, photo: Photo, faces: list[DetectedFace], face: int | None, quarters: int
+    ) -> _Sight | None:
+        """The chosen face seen again from near by."""
+        if not faces:
+            return None
+        chosen, notes = _choose(faces, face, photo.name)
+        pixels = np.rot90(photo.pixels, quarters)
+        crop, left, top = _around(pixels, chosen)
+        small = _shrunk(crop, _CROP_SIDE)
+        near = self.detect_fast(small)
+        shift = np.inf
+        if near is not None:
+            near = _moved(near, crop.shape[1] / small.shape[1], (left, top))
+            offsets = np.linalg.norm((near.points - chosen.points)[:, :2], axis=1)
+            shift = float(np.median(offsets)) / _eye_distance(near)
+        sight = _Sight(near or chosen, shift, quarters, notes)
+        return _turned_back(sight, pixels.shape[1], pixels.shape[0])
+
+
+@dataclass(frozen=True)
+class _Sight:
+    """A face as found in a photo that was turned for it.
+
+    Attributes:
+        shift: median movement between the two passes over the distance between the eyes.
+        quarters: by how many quarter turns counterclockwise the photo was turned.
+    """
+
+    face: DetectedFace
+    shift: float
+    quarters: int
+    notes: tuple[str, ...]
+
+    @property
+    def steady(self) -> bool:
+        """Both passes agree and the head is within 60 degrees of upright."""
+        up_in_image = -self.face.R_cam_head[1, 1]
+        return self.shift < _STEADY and bool(up_in_image > 0.5)
+
+
+def _landmarks(name: str, sight: _Sight) -> Landmarks:
+    notes = list(sight.notes)
+    if sight.quarters:
+        degrees = {1: 90, 2: 180, 3: -90}[sight.quarters]
+        notes.append(f"the face was found after turning the photo by {degrees} degrees")
+    distance = _eye_distance(sight.face)
+    if distance < MIN_EYE_DISTANCE_PX:
+        raise EstimationError(
+            f"{name}: the face is too small, {distance:.0f} px between the eyes; "
+            f"{MIN_EYE_DISTANCE_PX:.0f} are needed, {GOOD_EYE_DISTANCE_PX:.0f} advised"
+        )
+    if distance < GOOD_EYE_DISTANCE_PX:
+        notes.append(
+            f"the face is small, {distance:.0f} px between the eyes: expect "
+            f"rough landmarks and texture; {GOOD_EYE_DISTANCE_PX:.0f} are advised"
+        )
+    return Landmarks(
+        sight.face.points[:, :2],
+        facing_confidence(sight.face.points, sight.face.R_cam_head),
+        sight.face.blendshapes,
+        sight.face.R_cam_head,
+        tuple(notes),
+    )
+
+
+def _choose(
+    faces: list[DetectedFace], face: int | None, name: str
+) -> tuple[DetectedFace, tuple[str, ...]]:
+    """The largest, or number `face` from the left; a note when there was a choice."""
+    ordered = sorted(faces, key=lambda found: float(found.points[:, 0].mean()))
+    if face is not None:
+        if face > len(ordered):
+            raise InputError("face", f"1 to {len(ordered)}, the faces in {name}", face)
+        return ordered[face - 1], ()
+    largest = max(range(len(ordered)), key=lambda i: ordered[i].width)
+    if len(ordered) == 1:
+        return ordered[0], ()
+    note = f"{len(ordered)} faces: number {largest + 1} from the left, the largest, is used"
+    return ordered[largest], (note,)
+
+
+def _same_place(one: DetectedFace, other: DetectedFace) -> bool:
+    apart = np.linalg.norm((one.points - other.points).mean(axis=0)[:2])
+    return bool(apart < max(one.width, other.width) / 2)
+
+
+def _eye_distance(face: DetectedFace) -> float:
+    """Px between the irises, in depth too, so that a turned head does not seem smaller."""
+    return float(np.linalg.norm(face.points[LEFT_IRIS] - face.points[RIGHT_IRIS]))
+
+
+def _moved(face: DetectedFace, factor: float, offset: tuple[int, int] = (0, 0)) -> DetectedFace:
+    """The face in the pixels of the picture that this one was cut from and scaled."""
+    return replace(face, points=face.points * factor + np.array([*offset, 0.0]))
+
+
+def _around(pixels: Array, face: DetectedFace) -> tuple[Array, int, int]:
+    """A square cut-out around the face, as far as the photo reaches, and its left and top."""
+    low, high = face.points[:, :2].min(axis=0), face.points[:, :2].max(axis=0)
+    half = _CROP_WIDTHS * face.width / 2
+    left, top = np.maximum((low + high) / 2 - half, 0).astype(int)
+    right, bottom = np.ceil((low + high) / 2 + half).astype(int)
+    return pixels[top:bottom, left:right], int(left), int(top)
+
+
+def _shrunk(pixels: UInt8[Array, "h w 3"], side: int) -> UInt8[Array, "h w 3"]:
+    """At most `side` px long."""
+    import cv2
+
+    height, width = pixels.shape[:2]
+    factor = side / max(height, width)
+    if factor >= 1:
+        return pixels
+    size = max(1, round(width * factor)), max(1, round(height * factor))
+    small: Array = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    return small
+
+
+def _turned_back(sight: _Sight, width: int, height: int) -> _Sight:
+    """From the turned photo, of this size, to the photo as it stands."""
+    points, rotation = sight.face.points, sight.face.R_cam_head
+    for _ in range(sight.quarters):
+        points = points @ _QUARTER.T + np.array([height, 0.0, 0.0])
+        rotation = _QUARTER @ rotation
+        width, height = height, width
+    return replace(sight, face=replace(sight.face, points=points, R_cam_head=rotation))

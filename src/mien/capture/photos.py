@@ -1,0 +1,209 @@
+"""Photos of any common kind as upright 8-bit sRGB."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mien.arrays import Array, UInt8, check_image, check_positive, frozen
+from mien.capture.exif import focal_prior_px, orientation
+from mien.errors import FileFormatError, InputError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+MAX_SIDE = 4096
+"""Longest side, in px, of a photo in memory unless the caller says otherwise."""
+
+MAX_PIXELS = 175_000_000
+"""Larger files are refused before any pixel of theirs is decoded (Pillow's own limit is 179 MP)."""
+
+_JPEG = (".jpg", ".jpeg", ".jpe", ".jfif")
+_HEIF = (".heic", ".heif", ".hif", ".avif")
+PHOTO_SUFFIXES = frozenset((*_JPEG, *_HEIF, ".png", ".tif", ".tiff", ".webp", ".bmp"))
+"""Endings (lower case) by which a folder's photos are told from its other files."""
+
+
+@dataclass(frozen=True)
+class Photo:
+    """One picture, upright, sRGB.
+
+    Attributes:
+        name: file name with its ending; unique within one expression of a capture.
+        path: the file it came from (for a frame of a video, the video).
+        pixels: (H, W, 3) uint8 sRGB after orientation, read-only.
+        focal_prior_px: focal length that the file states, in px of `pixels`, or None.
+        original_size: (width, height) in px after orientation, before any downscaling.
+        notes: what was done to the picture that its owner may want to know.
+    """
+
+    name: str
+    path: Path
+    pixels: UInt8[Array, "h w 3"]
+    focal_prior_px: float | None = None
+    original_size: tuple[int, int] | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pixels", frozen(check_image(self.name, self.pixels)))
+        if self.original_size is None:
+            object.__setattr__(self, "original_size", self.size)
+
+    @property
+    def stem(self) -> str:
+        """The name without its ending, by which annotations are found."""
+        return Path(self.name).stem
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of `pixels`."""
+        return self.pixels.shape[1], self.pixels.shape[0]
+
+    @property
+    def scale(self) -> float:
+        """Pixels in memory per pixel of the original, along the longer side."""
+        assert self.original_size is not None
+        return max(self.size) / max(self.original_size)
+
+
+def load_photo(path: str | Path, *, max_side: int = MAX_SIDE) -> Photo:
+    """A photo, turned upright, converted to 8-bit sRGB, at most `max_side` px long.
+
+    Nothing is ever held as floating point, and a JPEG that will be shrunk is decoded at a reduced
+    size, so that photos of 100 megapixels need no more memory than their own bytes.
+
+    Args:
+        path: JPEG, PNG, TIFF, WebP, BMP, HEIC, AVIF or whatever else Pillow can read.
+        max_side: limit in px on the longer side.
+    Raises:
+        InputError: there is no such file, it may not be read, `max_side` is not positive.
+        FileFormatError: not an image, empty, damaged, too large, of an unsupported sample type.
+    """
+    path = Path(path)
+    check_positive("max_side", max_side)
+    notes: list[str] = []
+    with _opened(path, notes) as image:
+        original = image.size
+        turn = orientation(image)
+        focal_per_px, focal_note = focal_prior_px(image)
+        notes += focal_note
+        upright = _turned(_shrunk_rgb(image, max_side, notes), turn)
+        pixels = np.asarray(upright)
+    if turn in (5, 6, 7, 8):
+        original = original[::-1]
+    scale = max(pixels.shape[:2]) / max(original)
+    if scale < 1:
+        notes.append(f"scaled from {original[0]}x{original[1]} to {upright.width}x{upright.height}")
+    focal = None if focal_per_px is None else focal_per_px * scale
+    return Photo(path.name, path, pixels, focal, original, tuple(notes))
+
+
+@contextmanager
+def _opened(path: Path, notes: list[str]) -> Iterator[Image]:
+    """The file as a Pillow image; whatever goes wrong while it is open becomes one clear line."""
+    from PIL import Image, UnidentifiedImageError
+
+    _check_readable(path)
+    _register_heif()
+    with warnings.catch_warnings(record=True) as caught:
+        # Pillow warns about damaged metadata and large pictures; the first is worth a note.
+        warnings.simplefilter("always")
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        try:
+            with Image.open(path) as image:
+                if image.width * image.height > MAX_PIXELS:
+                    raise _too_large(path, f"{image.width}x{image.height}")
+                yield image
+        except FileFormatError:
+            raise
+        except Image.DecompressionBombError:
+            raise _too_large(path, "more") from None
+        except UnidentifiedImageError:
+            problem = f"expected an image (JPEG, PNG, HEIC, ...), found {_kind_of(path)}"
+            raise FileFormatError(path, problem) from None
+        except Exception as error:
+            # Decoders raise whatever a damaged byte leads them to.
+            problem = f"expected a whole image, found a damaged one ({_one_line(error)})"
+            raise FileFormatError(path, problem) from error
+    notes += [f"odd file: {_one_line(warning.message)}" for warning in caught]
+
+
+def _check_readable(path: Path) -> None:
+    try:
+        with path.open("rb") as file:
+            empty = not file.read(1)
+    except FileNotFoundError:
+        raise InputError(path, "a photo", "no such file") from None
+    except IsADirectoryError:
+        raise InputError(path, "a photo", "a folder") from None
+    except OSError as error:
+        raise InputError(path, "a readable photo", error.strerror or error) from None
+    if empty:
+        raise FileFormatError(path, "expected an image, found an empty file")
+
+
+def _too_large(path: Path, found: str) -> FileFormatError:
+    limit = f"{MAX_PIXELS // 1_000_000} megapixels"
+    return FileFormatError(path, f"expected at most {limit}, found {found}")
+
+
+def _kind_of(path: Path) -> str:
+    with path.open("rb") as file:
+        head = file.read(512)
+    return "a text file" if all(32 <= b < 127 or b in b"\t\r\n" for b in head) else "something else"
+
+
+def _one_line(message: object) -> str:
+    return " ".join(str(message).split())
+
+
+def _register_heif() -> None:
+    """Teach Pillow HEIC; doing it twice is harmless."""
+    import pillow_heif
+
+    pillow_heif.register_heif_opener()
+
+
+def _shrunk_rgb(image: Image, max_side: int, notes: list[str]) -> Image:
+    """Decoded as sRGB, the longer side at most `max_side`.
+
+    Shrinking comes before the colour conversion wherever the samples may be averaged, as the full
+    picture is then held only once.
+    """
+    from PIL import Image
+
+    from mien.capture.colour import to_eight_bits, to_srgb
+
+    factor = min(1.0, max_side / max(image.size))
+    target = max(1, round(image.width * factor)), max(1, round(image.height * factor))
+    if factor < 1:
+        image.draft(None, target)
+    if getattr(image, "n_frames", 1) > 1:
+        notes.append(f"holds {getattr(image, 'n_frames', 1)} pictures: the first is used")
+    profile = image.info.get("icc_profile")
+    eight_bits = to_eight_bits(image, notes)
+    if eight_bits.size != target and factor < 1:
+        eight_bits = eight_bits.resize(target, Image.Resampling.LANCZOS, reducing_gap=2.0)
+    return to_srgb(eight_bits, profile, notes)
+
+
+def _turned(image: Image, turn: int) -> Image:
+    """The picture with EXIF orientation 1 to 8 applied."""
+    from PIL.Image import Transpose
+
+    method = {
+        2: Transpose.FLIP_LEFT_RIGHT,
+        3: Transpose.ROTATE_180,
+        4: Transpose.FLIP_TOP_BOTTOM,
+        5: Transpose.TRANSPOSE,
+        6: Transpose.ROTATE_270,
+        7: Transpose.TRANSVERSE,
+        8: Transpose.ROTATE_90,
+    }.get(turn)
+    return image if method is None else image.transpose(method)
