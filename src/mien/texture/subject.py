@@ -1,0 +1,89 @@
+"""Which pixels of a photo show the person and not what is behind."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mien.arrays import Array, Bool, UInt8, check_image
+from mien.camera import Camera
+from mien.mesh import Mesh
+from mien.numeric.raster import rasterize
+
+# Longest side of the small image that is segmented, px.
+_SIDE = 320
+# Width of the strip on both sides of the mesh's outline in which the cut may run, as a share of
+# the head's size in the photo.
+_STRIP = 0.06
+
+
+def subject_mask(
+    mesh: Mesh, camera: Camera, photo: UInt8[Array, "h w 3"], *, least_contrast: float = 12.0
+) -> Bool[Array, "h w"]:
+    """Pixels that show the person rather than the background, as far as the mesh reaches.
+
+    A graph cut on colours, started from the mesh as the camera sees it: well inside its outline is
+    the person, well outside is not, and only in a strip between them the cut decides. Where both
+    sides of the strip look alike (dark hair before a dark wall) a cut would be a guess, and the
+    mesh's outline stands.
+
+    Args:
+        least_contrast: how far the colours of the two sides must lie apart (root of the summed
+            squares of 8-bit differences) for the cut to count there.
+    """
+    import cv2
+
+    photo = check_image("photo", photo)
+    scale = min(1.0, _SIDE / max(photo.shape[:2]))
+    small_camera = camera.resized(scale)
+    size = (small_camera.width, small_camera.height)
+    small = cv2.resize(photo, size, interpolation=cv2.INTER_AREA)
+    inside = rasterize(
+        small_camera.project(mesh.vertices),
+        small_camera.to_camera(mesh.vertices)[:, 2],
+        mesh.triangles,
+        *size,
+    ).mask
+    if not inside.any():
+        return np.zeros(photo.shape[:2], bool)
+    strip = max(2.0, _STRIP * float(np.sqrt(inside.sum())))
+    cut = _cut(small, inside, strip)
+    trusted = _contrast(small, inside, strip) > least_contrast
+    mask = np.where(trusted, cut, inside).astype(np.float32)
+    full = cv2.resize(mask, photo.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+    person: Array = full > 0.5
+    return person
+
+
+def _cut(image: Array, inside: Array, strip: float) -> Bool[Array, "h w"]:
+    import cv2
+
+    deep = cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, 5)
+    outer = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, 5)
+    labels = np.where(inside, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
+    labels[deep > strip] = cv2.GC_FGD
+    # Hair stands further off the mesh than anything else does, and belongs to the person.
+    labels[outer > 3 * strip] = cv2.GC_BGD
+    if not ((labels == cv2.GC_FGD).any() and (labels == cv2.GC_BGD).any()):
+        return inside
+    cv2.setRNGSeed(0)
+    models = np.zeros((2, 1, 65))
+    bgr = np.ascontiguousarray(image[..., ::-1])
+    cv2.grabCut(bgr, labels, None, models[0], models[1], 3, cv2.GC_INIT_WITH_MASK)
+    person: Array = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
+    return person
+
+
+def _contrast(image: Array, inside: Array, strip: float) -> Array:
+    """How unlike the colours inside and outside the outline are, around each pixel."""
+    import cv2
+
+    deep = cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, 5)
+    outer = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, 5)
+    sigma = 2 * strip
+    means = []
+    for side in (deep > strip / 2, outer > strip):
+        weight = cv2.GaussianBlur(side.astype(np.float32), (0, 0), sigma)
+        sums = cv2.GaussianBlur(image.astype(np.float32) * side[..., None], (0, 0), sigma)
+        means.append(sums / np.maximum(weight, 1e-4)[..., None])
+    contrast: Array = np.linalg.norm(means[0] - means[1], axis=2)
+    return contrast

@@ -1,0 +1,254 @@
+"""Which photo sees which texel, and how well: visibility, positional certainty, feathering."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+
+from mien.arrays import Array, Bool, Float, UInt8, check_image, check_positive, frozen
+from mien.camera import Camera
+from mien.errors import InputError
+from mien.mesh import Mesh
+from mien.numeric.raster import rasterize
+from mien.numeric.sample import bilinear_place
+from mien.numeric.threads import for_row_bands
+from mien.texture.surface import SurfaceMap
+
+# Two neighbouring pixels of the depth map that differ by more lie on different layers. One pixel
+# is a fraction of a millimetre wide: no surface that could be textured is so steep.
+_JUMP_MM = 3.0
+# What the camera sees of a surface steeper than this (80 degrees) is no use.
+_LEAST_CERTAINTY = 0.17
+
+
+@dataclass(frozen=True)
+class View:
+    """A photo made ready to be sampled.
+
+    Attributes:
+        camera: of the photo as it is here (perhaps smaller than the original).
+        photo: (H, W, 3) uint8.
+        depth: (H, W) float32 mm, of the nearest surface that hides others; infinite beside it.
+        usable: (H, W) bool: pixels that show the head for certain: not the background, not so
+            near an outline that a small error of the shape puts something else there.
+    """
+
+    camera: Camera
+    photo: UInt8[Array, "h w 3"]
+    depth: Float[Array, "h w"]
+    usable: Bool[Array, "h w"]
+
+
+@dataclass(frozen=True)
+class Sight:
+    """How one view sees the texels of a surface.
+
+    Attributes:
+        feathered: (H, W) float32, F_k: 1 where the texel is visible, ramped to 0 at the boundary.
+        certainty: (H, W) float32, P_k: cosine between normal and direction to the camera.
+    """
+
+    feathered: Float[Array, "h w"]
+    certainty: Float[Array, "h w"]
+
+
+def prepare_view(
+    mesh: Mesh,
+    camera: Camera,
+    photo: UInt8[Array, "h w 3"],
+    *,
+    texel_mm: float = 0.0,
+    subject: Bool[Array, "h w"] | None = None,
+    outline_mm: float = 3.0,
+    occlusion_mm: float = 1.0,
+) -> View:
+    """The photo with its depth map (the Z-buffer of P02 sec. 5.2.1).
+
+    Args:
+        mesh: everything that hides something.
+        texel_mm: the photo is halved while its pixels are much finer than this.
+        subject: pixels that show the person; all when None.
+        outline_mm: how far from the mesh's outline in the photo a pixel has to be to be used.
+        occlusion_mm: how far from an edge inside the outline, where one part hides another.
+    Raises: InputError: no image, a camera of another size.
+    """
+    photo = check_image("photo", photo)
+    if photo.shape[:2] != (camera.height, camera.width):
+        expected = f"{camera.width}x{camera.height} px as its camera says"
+        raise InputError("photo", expected, f"{photo.shape[1]}x{photo.shape[0]}")
+    in_camera = camera.to_camera(mesh.vertices)
+    pixel_mm = float(np.median(in_camera[:, 2])) / camera.focal_px
+    while texel_mm > 1.5 * pixel_mm and min(photo.shape[:2]) > 256:
+        camera, photo, pixel_mm = _halved_camera(camera), _halved(photo), 2 * pixel_mm
+        subject = None if subject is None else subject[1::2, 1::2]
+    pixels = camera.project(mesh.vertices)
+    raster = rasterize(pixels, in_camera[:, 2], mesh.triangles, camera.width, camera.height)
+    usable = _away_from_edges(raster.depth, outline_mm / pixel_mm, occlusion_mm / pixel_mm)
+    if subject is not None:
+        usable &= subject[: camera.height, : camera.width]
+    return View(camera, photo, raster.depth, usable)
+
+
+def sight(
+    surface: SurfaceMap, view: View, *, feather_mm: float = 12.0, tolerance_mm: float = 1.5
+) -> Sight:
+    """Feathered visibility F_k and positional certainty P_k of a surface in one view.
+
+    Args:
+        feather_mm: width of the ramp from invisible to fully visible, along the surface.
+        tolerance_mm: how far behind the depth map a visible point can lie; more where the surface
+            is steep, by what its depth changes within a pixel.
+    Source: P02 sec. 5.2.1 and 5.2.2, steps 1 and 2. A texel is visible when it is inside the photo,
+        faces the camera, lies on the depth map and falls on a usable pixel.
+    """
+    check_positive("tolerance_mm", tolerance_mm)
+    height, width = surface.triangle_ids.shape
+    visible = np.zeros((height, width), np.uint8)
+    certainty = np.zeros((height, width), np.float32)
+    arrays = (surface.points, surface.normals, surface.triangle_ids, view.depth, view.usable)
+    inputs = [frozen(np.ascontiguousarray(array)) for array in arrays]
+    pose = camera_numbers(view.camera)
+
+    def rows(first: int, end: int) -> None:
+        _see_rows(*inputs, pose, tolerance_mm, first, end, visible, certainty)
+
+    for_row_bands(rows, height, work=width * height)
+    # Beyond a chart's edge nothing is known, so it does not count as a boundary.
+    seen = visible.astype(bool) | (surface.triangle_ids < 0)
+    feathered = feather(seen, feather_mm / surface.texel_mm, wrap=surface.wrap)
+    return Sight(feathered * visible, certainty)
+
+
+def feather(
+    visible: Bool[Array, "h w"], width: float, *, wrap: bool = False
+) -> Float[Array, "h w"]:
+    """1 inside, 0 outside, and between them the cubic 3 t^2 - 2 t^3 over `width` pixels inwards.
+
+    Args:
+        wrap: left and right ends touch.
+    Source: P02 sec. 5.2.2, step 1.
+    """
+    import cv2
+
+    if width <= 0:
+        return visible.astype(np.float32)
+    margin = min(int(np.ceil(width)) + 1, visible.shape[1]) if wrap else 0
+    padded = np.pad(visible, ((0, 0), (margin, margin)), mode="wrap").astype(np.uint8)
+    distance = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    # The distance to the nearest invisible pixel is 1 for a pixel at the boundary.
+    ramp = smoothstep((distance[:, margin : margin + visible.shape[1]] - 0.5) / width)
+    return np.where(visible, ramp, 0).astype(np.float32)
+
+
+def smoothstep(t: Array) -> Array:
+    """The cubic from 0 at t <= 0 to 1 at t >= 1 with level ends."""
+    t = np.clip(t, 0, 1)
+    ramp: Array = t * t * (3 - 2 * t)
+    return ramp
+
+
+def camera_numbers(camera: Camera) -> Float[Array, " 18"]:
+    """Rotation, translation, focal length, principal point and centre, for the kernels."""
+    parts = (
+        camera.R_cam_head.ravel(),
+        camera.t_cam_head,
+        [camera.focal_px, *camera.principal],
+        camera.center,
+    )
+    return frozen(np.concatenate(parts))
+
+
+def _halved(photo: Array) -> Array:
+    import cv2
+
+    height, width = photo.shape[0] // 2, photo.shape[1] // 2
+    half: Array = cv2.resize(
+        photo[: 2 * height, : 2 * width], (width, height), interpolation=cv2.INTER_AREA
+    )
+    return half
+
+
+def _halved_camera(camera: Camera) -> Camera:
+    return replace(
+        camera,
+        width=camera.width // 2,
+        height=camera.height // 2,
+        focal_px=camera.focal_px / 2,
+        principal_px=camera.principal / 2,
+    )
+
+
+def _away_from_edges(depth: Array, outline_px: float, occlusion_px: float) -> Bool[Array, "h w"]:
+    """Pixels of the mesh that are further from its outline and from its inner edges than told."""
+    import cv2
+
+    inside = np.isfinite(depth)
+    near = np.where(inside, depth, 0)
+    # Beyond the photo's border the mesh goes on: the border itself is no outline.
+    far = cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5) > outline_px
+    edges = np.zeros(depth.shape, bool)
+    for axis in (0, 1):
+        jump = np.abs(np.diff(near, axis=axis)) > _JUMP_MM
+        ahead, behind = [slice(None)] * 2, [slice(None)] * 2
+        ahead[axis], behind[axis] = slice(1, None), slice(None, -1)
+        edges[tuple(ahead)] |= jump
+        edges[tuple(behind)] |= jump
+    edges &= inside
+    clear = cv2.distanceTransform((~edges).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    away: Array = far & (clear > occlusion_px)
+    return away
+
+
+@njit(cache=True, nogil=True)
+def project_point(pose: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Pixel and depth of a point; pose as camera_numbers makes it."""
+    depth = pose[6] * x + pose[7] * y + pose[8] * z + pose[11]
+    scale = pose[12] / depth
+    column = scale * (pose[0] * x + pose[1] * y + pose[2] * z + pose[9]) + pose[13]
+    row = scale * (pose[3] * x + pose[4] * y + pose[5] * z + pose[10]) + pose[14]
+    return column, row, depth
+
+
+@njit(cache=True, nogil=True)
+def _see_rows(
+    points: Array,
+    normals: Array,
+    ids: Array,
+    depth_map: Array,
+    usable: Array,
+    pose: Array,
+    tolerance: float,
+    first: int,
+    end: int,
+    visible: Array,
+    certainty: Array,
+) -> None:
+    height, width = depth_map.shape
+    for row in range(first, end):
+        for col in range(ids.shape[1]):
+            if ids[row, col] < 0:
+                continue
+            x, y, z = points[row, col]
+            dx, dy, dz = pose[15] - x, pose[16] - y, pose[17] - z
+            away = np.sqrt(dx * dx + dy * dy + dz * dz)
+            nx, ny, nz = normals[row, col]
+            cosine = (nx * dx + ny * dy + nz * dz) / away
+            certainty[row, col] = max(cosine, 0.0)
+            if cosine < _LEAST_CERTAINTY:
+                continue
+            px, py, depth = project_point(pose, x, y, z)
+            if not (depth > 0.0 and 0.0 <= px < width and 0.0 <= py < height):
+                continue
+            # Within a pixel the depth changes by its width times the tangent of the tilt.
+            slope = np.sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine
+            slack = tolerance + slope * depth / pose[12]
+            x0, x1, y0, y1, _, _ = bilinear_place(px, py, width, height)
+            # A bilinear lookup reads four pixels, and all of them must be good.
+            nearest = min(depth_map[y0, x0], depth_map[y0, x1])
+            nearest = min(nearest, depth_map[y1, x0], depth_map[y1, x1])
+            if depth - nearest > slack:
+                continue
+            if usable[y0, x0] and usable[y0, x1] and usable[y1, x0] and usable[y1, x1]:
+                visible[row, col] = 1
