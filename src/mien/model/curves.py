@@ -112,7 +112,8 @@ def epipolar_lines(
         ]
     )
     size = np.linalg.norm(lines[:, :2], axis=1, keepdims=True)
-    return np.divide(lines, size, out=np.full(lines.shape, np.nan), where=size > 0)
+    unit: Array = np.divide(lines, size, out=np.full(lines.shape, np.nan), where=size > 0)
+    return unit
 
 
 def _measured(curve: Array) -> tuple[Float[Array, "m 2"], Float[Array, " m"]]:

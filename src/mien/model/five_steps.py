@@ -11,6 +11,7 @@ photos (or points) at once.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +34,7 @@ _NEAREST_MM, _FARTHEST_MM = 200.0, 100_000.0
 _LEAST_DEPTH = 0.05
 """Floor of 1 + eta (r_z . m), so that a stray point behind a camera cannot turn the weights."""
 _ANCHOR = 1e-8
-"""Weight, relative to the data's, of a point's pull to its anchor: only settles what no ray does."""
+"""Weight, relative to the data's, of a point's pull to its anchor: for what no ray settles."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,26 @@ class Poses:
     R: Float[Array, "k 3 3"]
     t: Float[Array, "k 2"]
     eta: Float[Array, " k"]
+
+    @staticmethod
+    def identity(photos: int) -> Poses:
+        """Cameras 1 m away, looking along the head's z axis, at 1 px/mm."""
+        turns = np.tile(np.eye(3), (photos, 1, 1))
+        return Poses(np.ones(photos), turns, np.zeros((photos, 2)), np.full(photos, 1e-3))
+
+    @staticmethod
+    def stacked(parts: Sequence[Poses]) -> Poses:
+        """The photos of all parts in one."""
+        return Poses(
+            np.concatenate([part.s for part in parts]),
+            np.concatenate([part.R for part in parts]),
+            np.concatenate([part.t for part in parts]),
+            np.concatenate([part.eta for part in parts]),
+        )
+
+    def of(self, keep: Array) -> Poses:
+        """Some of the photos, by mask or index."""
+        return Poses(self.s[keep], self.R[keep], self.t[keep], self.eta[keep])
 
 
 def reprojection(poses: Poses, points: Float[Array, "n 3"]) -> Float[Array, "k n 2"]:

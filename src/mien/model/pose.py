@@ -8,22 +8,30 @@ import numpy as np
 
 from mien.arrays import Array, Bool, Float, check_array
 from mien.camera import Camera
-from mien.errors import EstimationError, InputError
+from mien.errors import EstimationError
 from mien.model.alternation import Alternation, alternate
-from mien.model.five_steps import Poses, reprojection
-from mien.model.pose_start import estimate_poses, poses_from_rotations, resect
-from mien.numeric.robust import loss_named, robust_sigma
-from mien.numeric.similarity import estimate_similarity
+from mien.model.five_steps import Poses
+from mien.model.pose_problem import (
+    PoseProblem,
+    check_problem,
+    joint_sigma,
+    residual_lengths,
+    rms_per_photo,
+)
+from mien.model.pose_start import estimate_poses, poses_from_rotations, resect_robustly
+from mien.numeric.robust import loss_named
+from mien.numeric.similarity import Similarity, estimate_similarity
 
 __all__ = ["PoseResult", "recover_pose"]
 
 _MIN_POINTS = 6
-_SIGMA_FLOOR_PX = 1e-3
+_ROUNDS, _SWEEPS_A_ROUND = 6, 30
+"""Robust rounds, each with the residual scale that the last one left."""
 _REJECT_SIGMAS = 5.0
 _MIN_TRUSTED = 0.6
-"""Share of a photo's points that must fit for the photo to count."""
-_MAX_RATIO = 4.0
-"""A photo whose points fit this many times worse than the others' shows something else."""
+"""Share of a photo's points that must agree with the other photos for it to count."""
+_MAX_RATIO, _MIN_MISFIT_MM = 4.0, 1.0
+"""A photo whose points fit so much worse than the others', and so badly, shows something else."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +40,8 @@ class PoseResult:
 
     Attributes:
         cameras: one a photo; None where the photo was left out.
-        points: (N, 3) mm, in the frame and scale of the initial shape; a point that no photo
-            tells stays as it was.
+        points: (N, 3) mm, in the frame and scale of the initial shape; a point that fewer than two
+            photos tell stays as it was.
         trusted: (K, N) observations that were seen and fit.
         rms_px: (K,) root mean square length of the trusted reprojection errors; NaN if left out.
         problems: one a photo: why it was left out, "" if it fits.
@@ -72,7 +80,7 @@ def recover_pose(
     Each photo is first placed by itself on the initial shape (camera steps only), then all unknowns
     are swept in P02's order, s, m, R, t_xy, eta. With a robust loss, observations that stay far off
     are dropped and the rest is solved again by plain least squares. A photo that does not fit the
-    shape by itself, or that spoils the joint solution, is left out and named in `problems`.
+    shape by itself, or that disagrees with the others, is left out and named in `problems`.
 
     Args:
         image_points: (K, N, 2) px, NaN where a photo does not show a point.
@@ -90,22 +98,20 @@ def recover_pose(
     Source: P02 sec. 5.1.1, eq. (2), app. A. Differs in the start from single photos, the robust
         weights, the acceleration and the verdicts; the steps are P02's.
     """
-    problem = _check(image_points, points, sizes, principal_px, weights)
+    problem = check_problem(image_points, points, sizes, principal_px, weights)
     settings = _Settings(loss, history, max_sweeps, tolerance)
-    problems = [
-        "" if count >= _MIN_POINTS else f"shows {count} points, needs {_MIN_POINTS}"
-        for count in np.count_nonzero(problem.weights, axis=1)
-    ]
-    start = _start(problem, problems, rotations, focal_px, max_misfit_mm, loss)
+    start, problems = _start(problem, rotations, focal_px, max_misfit_mm, loss)
     while True:
         keep = np.array([not text for text in problems])
         if not keep.any():
             raise EstimationError("no photo fits: " + "; ".join(sorted(set(problems))))
-        solution, trusted = _solve(problem.of(keep), _of(start, keep), settings)
-        worst = _worst_photo(problem.of(keep), solution, trusted)
-        if worst is None:
+        kept = problem.of(keep)
+        solution, trusted = _solve(kept, start.of(keep), settings)
+        verdict = _disagreeing_photo(kept, solution, trusted)
+        if verdict is None:
             return _result(problem, keep, tuple(problems), solution, trusted)
-        problems[np.flatnonzero(keep)[worst[0]]] = worst[1]
+        row, problem_text = verdict
+        problems[np.flatnonzero(keep)[row]] = problem_text
 
 
 @dataclass(frozen=True)
@@ -116,141 +122,77 @@ class _Settings:
     tolerance: float
 
 
-@dataclass(frozen=True)
-class _Problem:
-    """Centred observations: image (K, N, 2) relative to principal, points relative to center."""
-
-    image: Float[Array, "k n 2"]
-    weights: Float[Array, "k n"]
-    points: Float[Array, "n 3"]
-    center: Float[Array, " 3"]
-    sizes: Float[Array, "k 2"]
-    principal: Float[Array, "k 2"]
-
-    def of(self, keep: Bool[Array, " k"]) -> _Problem:
-        return replace(
-            self,
-            image=self.image[keep],
-            weights=self.weights[keep],
-            sizes=self.sizes[keep],
-            principal=self.principal[keep],
-        )
-
-
-def _check(
-    image_points: Array, points: Array, sizes: Array, principal: Array | None, weights: Array | None
-) -> _Problem:
-    points = check_array("points", points, (None, 3))
-    image = check_array("image_points", image_points, (None, len(points), 2), finite=False)
-    sizes = check_array("sizes", sizes, (len(image), 2))
-    if (sizes <= 0).any():
-        raise InputError("sizes", "widths and heights above zero", sizes.min())
-    principal = sizes / 2 if principal is None else principal
-    principal = check_array("principal_px", principal, (len(image), 2))
-    seen = np.isfinite(image).all(axis=2)
-    weights = np.ones(seen.shape) if weights is None else weights
-    weights = check_array("weights", weights, seen.shape)
-    if (weights < 0).any():
-        raise InputError("weights", "numbers of 0 or more", weights.min())
-    weights = np.where(seen, weights, 0.0)
-    used = weights.any(axis=0)
-    center = points[used].mean(axis=0) if used.any() else np.zeros(3)
-    relative = np.where(seen[..., None], image - principal[:, None], 0.0)
-    return _Problem(relative, weights, points - center, center, sizes, principal)
-
-
 def _start(
-    problem: _Problem,
-    problems: list[str],
+    problem: PoseProblem,
     rotations: Array | None,
     focal_px: Array | None,
     max_misfit_mm: float,
     loss: str,
-) -> Poses:
-    """Each photo on the initial shape; those that do not fit it get a problem."""
+) -> tuple[Poses, list[str]]:
+    """Each photo's pose on the initial shape, and what is wrong with those that do not fit it."""
     count = len(problem.image)
-    poses = Poses(
-        np.ones(count),
-        np.tile(np.eye(3), (count, 1, 1)),
-        np.zeros((count, 2)),
-        np.full(count, 1e-3),
-    )
     if rotations is not None:
         rotations = check_array("rotations", rotations, (count, 3, 3))
     if focal_px is not None:
         focal_px = check_array("focal_px", focal_px, (count,))
+    poses, problems = [], []
     for k in range(count):
-        if problems[k]:
+        photo = problem.of(np.arange(count) == k)
+        seen = np.count_nonzero(photo.weights)
+        if seen < _MIN_POINTS:
+            poses.append(Poses.identity(1))
+            problems.append(f"shows {seen} points, needs {_MIN_POINTS}")
             continue
-        one = np.arange(count) == k
-        part = problem.of(one)
         if rotations is None:
-            pose = estimate_poses(part.image, part.weights, part.points)
+            pose = estimate_poses(photo.image, photo.weights, photo.points)
         else:
-            focal = None if focal_px is None else focal_px[one]
+            focal = None if focal_px is None else focal_px[k : k + 1]
             pose = poses_from_rotations(
-                rotations[one], focal, part.image, part.weights, part.points
+                rotations[k : k + 1], focal, photo.image, photo.weights, photo.points
             )
-        pose, misfit = _resect_robustly(pose, part, loss)
-        if misfit > max_misfit_mm:
-            problems[k] = (
-                f"its points lie {misfit:.0f} mm off any view of the initial shape "
-                f"(at most {max_misfit_mm:.0f})"
-            )
-        for name in ("s", "R", "t", "eta"):
-            getattr(poses, name)[k] = getattr(pose, name)[0]
-    return poses
-
-
-def _resect_robustly(pose: Poses, part: _Problem, loss: str) -> tuple[Poses, float]:
-    """The pose over the initial shape, and the robust deviation from it in mm."""
-    weights, sigma = part.weights, np.inf
-    seen = part.weights > 0
-    for _ in range(4):
-        pose = resect(pose, part.points, part.image, weights)
-        lengths = np.linalg.norm(reprojection(pose, part.points) - part.image, axis=-1)
-        sigma = max(robust_sigma(lengths[seen]), _SIGMA_FLOOR_PX)
-        weights = part.weights * loss_named(loss)((lengths / sigma) ** 2)[1]
-    return pose, sigma * _spread(part.points, part.weights) / _spread(part.image[0], part.weights)
-
-
-def _spread(positions: Array, weights: Array) -> float:
-    """Size of what is seen, whatever the pose makes of it."""
-    return float(np.sqrt(positions[weights[0] > 0].var(axis=0).sum()))
+        pose, misfit = resect_robustly(pose, photo.points, photo.image, photo.weights, loss)
+        poses.append(pose)
+        problems.append(
+            f"its points lie {misfit:.0f} mm off any view of the initial shape, "
+            f"at most {max_misfit_mm:.0f} mm would do"
+            if misfit > max_misfit_mm
+            else ""
+        )
+    return Poses.stacked(poses), problems
 
 
 def _solve(
-    problem: _Problem, start: Poses, settings: _Settings
+    problem: PoseProblem, start: Poses, settings: _Settings
 ) -> tuple[Alternation, Bool[Array, "k n"]]:
     """Robust sweeps with a shrinking scale, then least squares on what fits."""
     seen = problem.weights > 0
+    state = Alternation(start, problem.points, np.inf, 0, True)
     if len(problem.image) == 1:
-        only = Alternation(start, problem.points, 0.0, 0, True)
-        return only, seen
-    state = Alternation(start, problem.points, np.inf, 0, False)
+        return state, seen
     sweeps = 0
     if settings.loss != "linear":
-        for _ in range(6):
-            sigma = _joint_sigma(problem, state, seen)
-            state = _alternate(problem, state, problem.weights, settings, settings.loss, sigma, 30)
+        for round_ in range(_ROUNDS):
+            sigma = joint_sigma(problem, state, seen)
+            limit = _SWEEPS_A_ROUND if round_ < _ROUNDS - 1 else settings.max_sweeps
+            state = _alternate(
+                problem, state, problem.weights, settings, settings.loss, sigma, limit
+            )
             sweeps += state.sweeps
-        sigma = _joint_sigma(problem, state, seen)
-        state = _alternate(problem, state, problem.weights, settings, settings.loss, sigma)
-        sweeps += state.sweeps
-        sigma = _joint_sigma(problem, state, seen)
-        seen = seen & (_lengths(problem, state) <= _REJECT_SIGMAS * sigma)
-    state = _alternate(problem, state, problem.weights * seen, settings, "linear", 1.0)
+        sigma = joint_sigma(problem, state, seen)
+        seen = seen & (residual_lengths(problem, state) <= _REJECT_SIGMAS * sigma)
+    weights = problem.weights * seen
+    state = _alternate(problem, state, weights, settings, "linear", 1.0, settings.max_sweeps)
     return replace(state, sweeps=sweeps + state.sweeps), seen
 
 
 def _alternate(
-    problem: _Problem,
+    problem: PoseProblem,
     state: Alternation,
     weights: Array,
     settings: _Settings,
     loss: str,
-    sigma: float,
-    max_sweeps: int | None = None,
+    sigma_px: float,
+    max_sweeps: int,
 ) -> Alternation:
     return alternate(
         state.poses,
@@ -258,102 +200,66 @@ def _alternate(
         problem.image,
         weights,
         loss=loss_named(loss),
-        sigma_px=sigma,
+        sigma_px=sigma_px,
         history=settings.history,
-        max_sweeps=max_sweeps or settings.max_sweeps,
+        max_sweeps=max_sweeps,
         tolerance=settings.tolerance,
     )
 
 
-def _lengths(problem: _Problem, state: Alternation) -> Float[Array, "k n"]:
-    lengths: Array = np.linalg.norm(
-        reprojection(state.poses, state.points) - problem.image, axis=-1
-    )
-    return lengths
-
-
-def _joint_sigma(problem: _Problem, state: Alternation, seen: Bool[Array, "k n"]) -> float:
-    """Residual deviation in px per axis, corrected for the unknowns that the data were fitted by."""
-    shared = seen & (seen.sum(axis=0) >= 2)
-    rows = 2 * np.count_nonzero(shared)
-    unknowns = 7 * len(seen) - 7 + 3 * np.count_nonzero(shared.any(axis=0))
-    if rows <= unknowns:
-        return _SIGMA_FLOOR_PX
-    spread = robust_sigma(_lengths(problem, state)[shared])
-    return max(spread * float(np.sqrt(rows / (rows - unknowns))), _SIGMA_FLOOR_PX)
-
-
-def _worst_photo(
-    problem: _Problem, solution: Alternation, trusted: Bool[Array, "k n"]
+def _disagreeing_photo(
+    problem: PoseProblem, solution: Alternation, trusted: Bool[Array, "k n"]
 ) -> tuple[int, str] | None:
-    """The photo that does not belong, if any, and why."""
-    count = len(problem.image)
-    if count < 3:
+    """The photo that agrees least with the others, if it disagrees, and how it does."""
+    if len(problem.image) < 3:
         return None
     shares = trusted.sum(axis=1) / np.count_nonzero(problem.weights, axis=1)
-    rms_mm = _rms(problem, solution, trusted) / solution.poses.s
-    ratios = np.array(
-        [rms_mm[k] / max(np.median(np.delete(rms_mm, k)), 1e-9) for k in range(count)]
-    )
-    if shares.min() < _MIN_TRUSTED:
-        worst = int(shares.argmin())
+    worst = int(shares.argmin())
+    if shares[worst] < _MIN_TRUSTED:
         return worst, f"only {100 * shares[worst]:.0f} % of its points agree with the other photos"
-    worst = int(ratios.argmax())
-    if ratios[worst] > _MAX_RATIO and rms_mm[worst] > 1.0:
-        return worst, f"its points fit {ratios[worst]:.1f} times worse than the other photos'"
+    rms_mm = rms_per_photo(problem, solution, trusted) / solution.poses.s
+    worst = int(rms_mm.argmax())
+    ratio = rms_mm[worst] / max(float(np.median(np.delete(rms_mm, worst))), 1e-9)
+    if ratio > _MAX_RATIO and rms_mm[worst] > _MIN_MISFIT_MM:
+        return worst, f"its points fit {ratio:.1f} times worse than the other photos'"
     return None
 
 
-def _rms(problem: _Problem, solution: Alternation, trusted: Array) -> Float[Array, " k"]:
-    squared = np.where(trusted, _lengths(problem, solution) ** 2, 0.0)
-    return np.sqrt(squared.sum(axis=1) / np.maximum(trusted.sum(axis=1), 1))
-
-
 def _result(
-    problem: _Problem,
+    problem: PoseProblem,
     keep: Bool[Array, " k"],
     problems: tuple[str, ...],
     solution: Alternation,
     trusted: Bool[Array, "k n"],
 ) -> PoseResult:
     """The solution moved back onto the initial shape's frame and scale."""
-    kept = problem.of(keep)
-    rms = np.full(len(keep), np.nan)
-    rms[keep] = _rms(kept, solution, trusted)
-    all_trusted = np.zeros(problem.weights.shape, bool)
-    all_trusted[keep] = trusted
-    points, move = solution.points, None
+    kept, poses = problem.of(keep), solution.poses
     told = trusted.sum(axis=0) >= 2
+    move = Similarity(1.0, np.eye(3), np.zeros(3))
     if np.count_nonzero(told) >= 3:
-        move = estimate_similarity(points[told], problem.points[told])
-        points = np.where(told[:, None], move(points), problem.points)
+        move = estimate_similarity(solution.points[told], problem.points[told])
     cameras: list[Camera | None] = [None] * len(keep)
     for row, k in enumerate(np.flatnonzero(keep)):
-        poses = solution.poses
-        eta = float(poses.eta[row])
-        rotation, shift = poses.R[row], np.append(poses.t[row], 1 / eta)
-        if move is not None:
-            rotation = rotation @ move.rotation.T
-            shift = move.scale * shift - rotation @ move.translation
+        rotation = poses.R[row] @ move.rotation.T
+        shift = move.scale * np.append(poses.t[row], 1 / poses.eta[row])
         cameras[k] = Camera(
             width=int(kept.sizes[row, 0]),
             height=int(kept.sizes[row, 1]),
-            focal_px=float(poses.s[row]) / eta,
+            focal_px=float(poses.s[row] / poses.eta[row]),
             R_cam_head=rotation,
-            t_cam_head=shift - rotation @ problem.center,
+            t_cam_head=shift - rotation @ (move.translation + problem.center),
             principal_px=kept.principal[row],
         )
+    rms, all_trusted = np.full(len(keep), np.nan), np.zeros(problem.weights.shape, bool)
+    rms[keep], all_trusted[keep] = rms_per_photo(kept, solution, trusted), trusted
+    lengths = residual_lengths(kept, solution)
     return PoseResult(
         cameras=tuple(cameras),
-        points=points + problem.center,
+        points=np.where(told[:, None], move(solution.points), problem.points) + problem.center,
         trusted=all_trusted,
         rms_px=rms,
         problems=problems,
-        cost=float((np.where(trusted, _lengths(kept, solution), 0.0) ** 2).sum()),
+        cost=float((lengths[trusted] ** 2).sum()),
         sweeps=solution.sweeps,
         converged=solution.converged,
     )
-
-
-def _of(poses: Poses, keep: Bool[Array, " k"]) -> Poses:
-    return Poses(poses.s[keep], poses.R[keep], poses.t[keep], poses.eta[keep])

@@ -15,9 +15,12 @@ from mien.model.five_steps import (
     step_scale,
     step_shift,
 )
+from mien.model.pose_problem import SIGMA_FLOOR_PX
+from mien.numeric.robust import loss_named, robust_sigma
 
-__all__ = ["estimate_poses", "poses_from_rotations", "resect"]
+__all__ = ["estimate_poses", "poses_from_rotations", "resect", "resect_robustly"]
 
+_ROUNDS = 4
 _FAR_START = 1 / 1000.0
 """eta of a camera 1 m away: what a start without any knowledge assumes."""
 
@@ -36,25 +39,17 @@ def estimate_poses(
         points: (N, 3) mm, relative to a place in their midst.
     Raises: EstimationError: a photo with fewer than four points, or all on one line.
     """
-    start = [_scaled_rotation(x, w, points) for x, w in zip(image, weights, strict=True)]
-    rotations = np.stack(start)
-    mirrored = np.stack([_reversed(R, w, points) for R, w in zip(rotations, weights, strict=True)])
-    tries = [
-        resect(poses_from_rotations(R, None, image, weights, points), points, image, weights)
-        for R in (rotations, mirrored)
-    ]
-    first, second = (_rms(poses, points, image, weights) for poses in tries)
-    better = first <= second
-    return Poses(
-        *(
-            np.where(better.reshape(-1, *[1] * (a.ndim - 1)), a, b)
-            for a, b in zip(
-                (tries[0].s, tries[0].R, tries[0].t, tries[0].eta),
-                (tries[1].s, tries[1].R, tries[1].t, tries[1].eta),
-                strict=True,
-            )
-        )
+    rotations = np.stack(
+        [_scaled_rotation(x, w, points) for x, w in zip(image, weights, strict=True)]
     )
+    reversed_ = np.stack([_reversed(R, w, points) for R, w in zip(rotations, weights, strict=True)])
+    first, second = (
+        resect(poses_from_rotations(R, None, image, weights, points), points, image, weights)
+        for R in (rotations, reversed_)
+    )
+    better = _rms(second, points, image, weights) < _rms(first, points, image, weights)
+    photos = np.arange(len(better))
+    return Poses.stacked([first, second]).of(photos + len(photos) * better)
 
 
 def poses_from_rotations(
@@ -89,16 +84,37 @@ def resect(
     weights: Float[Array, "k n"],
     *,
     sweeps: int = 30,
-    free_depth: bool = True,
 ) -> Poses:
     """The four camera steps repeated over fixed points."""
     for _ in range(sweeps):
         poses = step_rotation(poses, points, image, weights)
         poses = step_shift(poses, points, image, weights)
-        if free_depth:
-            poses = step_depth(poses, points, image, weights)
+        poses = step_depth(poses, points, image, weights)
         poses = step_scale(poses, points, image, weights)
     return poses
+
+
+def resect_robustly(
+    pose: Poses,
+    points: Float[Array, "n 3"],
+    image: Float[Array, "1 n 2"],
+    weights: Float[Array, "1 n"],
+    loss: str,
+) -> tuple[Poses, float]:
+    """One photo's pose over fixed points, and the robust deviation of its points from it in mm.
+
+    The deviation is measured by the extent of the points, so that a pose gone wrong cannot hide
+    or inflate it.
+    """
+    seen, trust, sigma = weights > 0, weights, np.inf
+    for _ in range(_ROUNDS):
+        pose = resect(pose, points, image, trust)
+        lengths = np.linalg.norm(reprojection(pose, points) - image, axis=-1)
+        sigma = max(robust_sigma(lengths[seen]), SIGMA_FLOOR_PX)
+        trust = weights * loss_named(loss)((lengths / sigma) ** 2)[1]
+    extent_mm = np.sqrt(points[seen[0]].var(axis=0).sum())
+    extent_px = np.sqrt(image[seen].var(axis=0).sum())
+    return pose, float(sigma * extent_mm / max(extent_px, 1e-12))
 
 
 def _scaled_rotation(image: Array, weights: Array, points: Array) -> Float[Array, "3 3"]:
@@ -127,4 +143,5 @@ def _reversed(rotation: Array, weights: Array, points: Array) -> Float[Array, "3
 
 def _rms(poses: Poses, points: Array, image: Array, weights: Array) -> Float[Array, " k"]:
     squared = ((reprojection(poses, points) - image) ** 2).sum(axis=-1)
-    return np.sqrt((weights * squared).sum(axis=1) / weights.sum(axis=1))
+    rms: Array = np.sqrt((weights * squared).sum(axis=1) / weights.sum(axis=1))
+    return rms

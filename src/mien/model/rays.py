@@ -78,7 +78,7 @@ def intersect_rays(
 
 
 def _ray_weights(image: Array, weights: Array | None) -> Float[Array, "k n"]:
-    seen = np.isfinite(image).all(axis=2)
+    seen: Array = np.asarray(np.isfinite(image).all(axis=2))
     weights = np.ones(seen.shape) if weights is None else weights
     weights = check_array("weights", weights, seen.shape)
     if (weights < 0).any():

@@ -1,0 +1,70 @@
+"""Levenberg-Marquardt: the loop alone; the problem brings its linearization and its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+__all__ = ["LmResult", "minimize_lm"]
+
+X = TypeVar("X")
+S = TypeVar("S")
+_MIN_DAMPING, _MAX_DAMPING = 1e-12, 1e12
+
+
+@dataclass(frozen=True)
+class LmResult(Generic[X]):
+    """Where the iteration ended.
+
+    Attributes:
+        x: the unknowns. cost: at x. iterations: linearizations made.
+        converged: False where the limit on iterations came first.
+    """
+
+    x: X
+    cost: float
+    iterations: int
+    converged: bool
+
+
+def minimize_lm(
+    x: X,
+    *,
+    cost: Callable[[X], float],
+    linearize: Callable[[X], Callable[[float], tuple[S, float]]],
+    move: Callable[[X, S], X],
+    damping: float = 1e-3,
+    max_iterations: int = 100,
+    tolerance: float = 1e-10,
+) -> LmResult[X]:
+    """Goes downhill from x.
+
+    Args:
+        cost: half the sum of squares (or its robust counterpart).
+        linearize: at x, gives the function that, for a damping relative to the normal matrix's
+            diagonal, solves for a step and predicts by how much the cost falls.
+        move: x after a step; where rotations stay rotations.
+        tolerance: relative fall of the cost, predicted and found, at which it has converged.
+    Source: Nielsen, Damping parameter in Marquardt's method, 1999 (how damping follows the gain).
+    """
+    value, growth = cost(x), 2.0
+    for iteration in range(1, max_iterations + 1):
+        solve = linearize(x)
+        while True:
+            step, predicted = solve(damping)
+            if not predicted > tolerance * value:
+                return LmResult(x, value, iteration, True)
+            moved = move(x, step)
+            moved_value = cost(moved)
+            gain = (value - moved_value) / predicted
+            if np.isfinite(moved_value) and gain > 0:
+                break
+            damping, growth = damping * growth, 2 * growth
+            if damping > _MAX_DAMPING:
+                return LmResult(x, value, iteration, True)
+        damping = max(damping * max(1 / 3, 1 - (2 * gain - 1) ** 3), _MIN_DAMPING)
+        growth, x, value = 2.0, moved, moved_value
+    return LmResult(x, value, max_iterations, False)
