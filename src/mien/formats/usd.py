@@ -1,0 +1,181 @@
+"""A head as .usdz: a mesh, preview materials and the face units as blend shapes (extra `usd`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.errors import InputError
+from mien.formats.atomic import atomic_file
+from mien.formats.image import encode_image
+from mien.formats.surface import ExportSurface, MaterialGroup, MorphTarget, export_surface
+from mien.model.head import Head
+
+# USD's own default unit, and what programs assume that do not read the file's.
+_METRES_PER_UNIT = 0.01
+_UNITS_PER_MM = 0.1
+_ROOT = "/head"
+_TEXTURE = "atlas.jpg"
+
+
+def save_usdz(
+    head: Head, path: str | Path, *, parts: Iterable[str] | None = None, units: bool = True
+) -> None:
+    """Write the head as one .usdz, whole or not at all: centimetres, y up.
+
+    One mesh with a subset and a UsdPreviewSurface for each group of parts. Face units and
+    photographed expressions are UsdSkel blend shapes, bound to a skeleton of one joint and to an
+    animation that holds their weights, all zero.
+
+    Args:
+        parts: names of parts; by default all but the hair cap.
+        units: with the face units.
+    Raises: InputError: usd-core is not installed; an unknown part, a place that cannot be written.
+    """
+    try:
+        from pxr import Usd, UsdUtils
+    except ImportError:
+        raise InputError(path, "usd-core (pip install 'mien[usd]')", "no such package") from None
+    surface = export_surface(head, parts=parts, units=units)
+    with TemporaryDirectory(prefix="mien-usd-") as folder, atomic_file(path) as temporary:
+        layer, package = Path(folder, "head.usdc"), Path(folder, "head.usdz")
+        if surface.texture is not None:
+            Path(folder, _TEXTURE).write_bytes(encode_image(surface.texture, "JPEG"))
+        stage = Usd.Stage.CreateNew(str(layer))
+        _fill_stage(stage, surface, head)
+        stage.Save()
+        if not UsdUtils.CreateNewUsdzPackage(str(layer), str(package)):
+            raise InputError(path, "usd-core to write the package", "a failure without a reason")
+        temporary.write_bytes(package.read_bytes())
+
+
+def _fill_stage(stage: Any, surface: ExportSurface, head: Head) -> None:
+    from pxr import UsdGeom, UsdSkel
+
+    UsdGeom.SetStageMetersPerUnit(stage, _METRES_PER_UNIT)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    root = UsdSkel.Root.Define(stage, _ROOT)
+    root.GetPrim().SetDisplayName(head.subject)
+    stage.SetDefaultPrim(root.GetPrim())
+    stage.GetRootLayer().comment = head.generator
+    mesh = _define_mesh(stage, surface)
+    extent = mesh.GetExtentAttr().Get()
+    root.CreateExtentAttr(extent)
+    for group in surface.groups:
+        _bind_material(stage, mesh, group, textured=surface.texture is not None)
+    if surface.targets:
+        _define_blend_shapes(stage, mesh, surface.targets)
+
+
+def _define_mesh(stage: Any, surface: ExportSurface) -> Any:
+    from pxr import Sdf, UsdGeom, Vt
+
+    mesh = surface.mesh
+    points = _points(mesh.vertices)
+    prim = UsdGeom.Mesh.Define(stage, f"{_ROOT}/mesh")
+    prim.CreatePointsAttr(points)
+    prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
+    prim.CreateFaceVertexCountsAttr(Vt.IntArray(len(mesh.triangles), 3))
+    prim.CreateFaceVertexIndicesAttr(_integers(mesh.triangles))
+    # A triangle mesh is meant as it is; the default would round it off.
+    prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    prim.CreateDoubleSidedAttr(True)
+    prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(surface.normals.astype(np.float32)))
+    prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    if len(mesh.uv_triangles):
+        coordinates = UsdGeom.PrimvarsAPI(prim).CreatePrimvar(
+            "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying
+        )
+        coordinates.Set(Vt.Vec2fArray.FromNumpy(mesh.uvs.astype(np.float32)))
+        coordinates.SetIndices(_integers(mesh.uv_triangles))
+    return prim
+
+
+def _bind_material(stage: Any, mesh: Any, group: MaterialGroup, *, textured: bool) -> None:
+    from pxr import Sdf, UsdGeom, UsdShade
+
+    material = UsdShade.Material.Define(stage, f"{_ROOT}/materials/{group.name}")
+    shader = UsdShade.Shader.Define(stage, material.GetPath().AppendChild("surface"))
+    shader.CreateIdAttr("UsdPreviewSurface")
+    shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(0.0)
+    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(group.roughness)
+    color = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+    if textured:
+        color.ConnectToSource(_texture_output(stage, material))
+    output = shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
+    material.CreateSurfaceOutput().ConnectToSource(output)
+    subset = UsdShade.MaterialBindingAPI(mesh).CreateMaterialBindSubset(
+        group.name, _integers(group.triangles), UsdGeom.Tokens.face
+    )
+    UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
+
+
+def _texture_output(stage: Any, material: Any) -> Any:
+    """The colour of the atlas at the mesh's texture coordinates."""
+    from pxr import Sdf, UsdShade
+
+    reader = UsdShade.Shader.Define(stage, material.GetPath().AppendChild("coordinates"))
+    reader.CreateIdAttr("UsdPrimvarReader_float2")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
+    place = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+    texture = UsdShade.Shader.Define(stage, material.GetPath().AppendChild("texture"))
+    texture.CreateIdAttr("UsdUVTexture")
+    texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(_TEXTURE)
+    texture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
+    texture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(place)
+    for wrap in ("wrapS", "wrapT"):
+        texture.CreateInput(wrap, Sdf.ValueTypeNames.Token).Set("clamp")
+    return texture.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
+
+
+def _define_blend_shapes(stage: Any, mesh: Any, targets: tuple[MorphTarget, ...]) -> None:
+    from pxr import Gf, UsdSkel, Vt
+
+    skeleton = UsdSkel.Skeleton.Define(stage, f"{_ROOT}/skeleton")
+    skeleton.CreateJointsAttr(["head"])
+    still = Vt.Matrix4dArray([Gf.Matrix4d(1.0)])
+    skeleton.CreateBindTransformsAttr(still)
+    skeleton.CreateRestTransformsAttr(still)
+    names = Vt.TokenArray([target.name for target in targets])
+    animation = UsdSkel.Animation.Define(stage, f"{_ROOT}/skeleton/animation")
+    animation.CreateBlendShapesAttr(names)
+    animation.CreateBlendShapeWeightsAttr(Vt.FloatArray(len(targets)))
+    UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets(
+        [animation.GetPath()]
+    )
+    binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
+    binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
+    binding.CreateJointIndicesPrimvar(True, 1).Set(Vt.IntArray(1))
+    binding.CreateJointWeightsPrimvar(True, 1).Set(Vt.FloatArray([1.0]))
+    binding.CreateBlendShapesAttr(names)
+    for number, target in enumerate(targets):
+        _define_blend_shape(stage, mesh, binding, number, target)
+
+
+def _define_blend_shape(
+    stage: Any, mesh: Any, binding: Any, number: int, target: MorphTarget
+) -> None:
+    from pxr import Tf, UsdSkel
+
+    path = mesh.GetPath().AppendChild(Tf.MakeValidIdentifier(target.name))
+    shape = UsdSkel.BlendShape.Define(stage, path)
+    shape.CreateOffsetsAttr(_points(target.offsets))
+    shape.CreatePointIndicesAttr(_integers(target.vertices))
+    binding.CreateBlendShapeTargetsRel().AddTarget(path)
+
+
+def _points(millimetres: Float[Array, "n 3"]) -> Any:
+    from pxr import Vt
+
+    return Vt.Vec3fArray.FromNumpy((_UNITS_PER_MM * millimetres).astype(np.float32))
+
+
+def _integers(indices: Array) -> Any:
+    from pxr import Vt
+
+    return Vt.IntArray.FromNumpy(indices.astype(np.int32).ravel())
