@@ -106,7 +106,7 @@ def save_annotations(path: str | Path, photo: Photo, annotations: Annotations) -
     unfinished = path.with_name(path.name + ".tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+        unfinished.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
         os.replace(unfinished, path)
     except OSError as error:
         unfinished.unlink(missing_ok=True)

@@ -11,11 +11,9 @@ import numpy as np
 from mien.arrays import Array, UInt8
 from mien.assets.detector import detector_model_path
 from mien.capture.landmarks import Landmarks, facing_confidence
-from mien.capture.mediapipe_face import DetectedFace, FaceNetwork
-from mien.capture.photos import Photo
+from mien.capture.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace, FaceNetwork
+from mien.capture.photos import Photo, shrunk
 from mien.errors import EstimationError, InputError
-
-RIGHT_IRIS, LEFT_IRIS = 468, 473
 
 MIN_EYE_DISTANCE_PX = 20.0
 """Below this landmarks are off by more than 3.5 % of the distance between the eyes."""
@@ -101,7 +99,7 @@ class LandmarkDetector:
     def _look(self, photo: Photo, face: int | None, quarters: int = 0) -> _Sight | None:
         """The face in the photo turned by quarters counterclockwise, in the photo's own pixels."""
         pixels = np.rot90(photo.pixels, quarters)
-        small = _shrunk(pixels, _SEARCH_SIDE)
+        small = shrunk(pixels, _SEARCH_SIDE)
         faces = self._network.faces(small)
         factor = pixels.shape[1] / small.shape[1]
         return self._refine(photo, [_moved(found, factor) for found in faces], face, quarters)
@@ -113,7 +111,7 @@ class LandmarkDetector:
         for top in (0, height // 4, height // 2):
             for left in (0, width // 4, width // 2):
                 part = photo.pixels[top : top + height // 2, left : left + width // 2]
-                small = _shrunk(part, _SEARCH_SIDE // 2)
+                small = shrunk(part, _SEARCH_SIDE // 2)
                 factor = part.shape[1] / small.shape[1]
                 for found in self._network.faces(small):
                     moved = _moved(found, factor, (left, top))
@@ -130,7 +128,7 @@ class LandmarkDetector:
         chosen, notes = _choose(faces, face, photo.name)
         pixels = np.rot90(photo.pixels, quarters)
         crop, left, top = _around(pixels, chosen)
-        small = _shrunk(crop, _CROP_SIDE)
+        small = shrunk(crop, _CROP_SIDE)
         near = self.detect_fast(small)
         shift = np.inf
         if near is not None:
@@ -225,19 +223,6 @@ def _around(pixels: Array, face: DetectedFace) -> tuple[Array, int, int]:
     left, top = np.maximum((low + high) / 2 - half, 0).astype(int)
     right, bottom = np.ceil((low + high) / 2 + half).astype(int)
     return pixels[top:bottom, left:right], int(left), int(top)
-
-
-def _shrunk(pixels: UInt8[Array, "h w 3"], side: int) -> UInt8[Array, "h w 3"]:
-    """At most `side` px long."""
-    import cv2
-
-    height, width = pixels.shape[:2]
-    factor = side / max(height, width)
-    if factor >= 1:
-        return pixels
-    size = max(1, round(width * factor)), max(1, round(height * factor))
-    small: Array = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
-    return small
 
 
 def _turned_back(sight: _Sight, width: int, height: int) -> _Sight:

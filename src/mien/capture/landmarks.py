@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array, check_rotation, frozen
-from mien.capture.mediapipe_face import LANDMARK_COUNT
+from mien.capture.mediapipe_face import LANDMARK_COUNT, LEFT_IRIS, RIGHT_IRIS
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,8 @@ class Landmarks:
         points: (478, 2) px of the photo.
         confidence: (478,) in [0, 1]: 1 where the surface faces the camera, 0 where it turns away;
             roughly the inverse of the relative error.
-        blendshapes: (52,) scores in [0, 1], `_neutral` first, then 51 of the ARKit units.
+        blendshapes: (52,) scores in [0, 1], ordered as `BLENDSHAPE_NAMES`: `_neutral`, then 51 of
+            the ARKit units (no `tongueOut`).
         R_cam_head: (3, 3) the detector's own idea of the head's rotation; good to some 10 degrees.
         notes: what was odd.
     """
@@ -39,15 +40,9 @@ class Landmarks:
         object.__setattr__(self, "R_cam_head", frozen(check_rotation("R", self.R_cam_head)))
 
     @property
-    def yaw(self) -> float:
-        """Radians; positive when the head is turned to its own left."""
-        x, _, z = self.R_cam_head[:, 2]
-        return float(np.arctan2(x, -z))
-
-    @property
-    def pitch(self) -> float:
-        """Radians; positive when the head looks up."""
-        return float(np.arcsin(np.clip(-self.R_cam_head[1, 2], -1.0, 1.0)))
+    def eye_distance_px(self) -> float:
+        """Between the irises, in the image."""
+        return float(np.linalg.norm(self.points[LEFT_IRIS] - self.points[RIGHT_IRIS]))
 
 
 def facing_confidence(

@@ -19,7 +19,64 @@ from mien.arrays import Array, Float, UInt8
 from mien.errors import MienError
 
 LANDMARK_COUNT = 478
+RIGHT_IRIS, LEFT_IRIS = 468, 473
 MAX_FACES = 8
+
+BLENDSHAPE_NAMES = (
+    "_neutral",
+    "browDownLeft",
+    "browDownRight",
+    "browInnerUp",
+    "browOuterUpLeft",
+    "browOuterUpRight",
+    "cheekPuff",
+    "cheekSquintLeft",
+    "cheekSquintRight",
+    "eyeBlinkLeft",
+    "eyeBlinkRight",
+    "eyeLookDownLeft",
+    "eyeLookDownRight",
+    "eyeLookInLeft",
+    "eyeLookInRight",
+    "eyeLookOutLeft",
+    "eyeLookOutRight",
+    "eyeLookUpLeft",
+    "eyeLookUpRight",
+    "eyeSquintLeft",
+    "eyeSquintRight",
+    "eyeWideLeft",
+    "eyeWideRight",
+    "jawForward",
+    "jawLeft",
+    "jawOpen",
+    "jawRight",
+    "mouthClose",
+    "mouthDimpleLeft",
+    "mouthDimpleRight",
+    "mouthFrownLeft",
+    "mouthFrownRight",
+    "mouthFunnel",
+    "mouthLeft",
+    "mouthLowerDownLeft",
+    "mouthLowerDownRight",
+    "mouthPressLeft",
+    "mouthPressRight",
+    "mouthPucker",
+    "mouthRight",
+    "mouthRollLower",
+    "mouthRollUpper",
+    "mouthShrugLower",
+    "mouthShrugUpper",
+    "mouthSmileLeft",
+    "mouthSmileRight",
+    "mouthStretchLeft",
+    "mouthStretchRight",
+    "mouthUpperUpLeft",
+    "mouthUpperUpRight",
+    "noseSneerLeft",
+    "noseSneerRight",
+)
+"""What the network scores, in its order."""
 
 _NOISE = re.compile(rb"^(WARNING: Logging before InitGoogle|INFO: |[IW]\d{4} )")
 
@@ -47,6 +104,12 @@ class DetectedFace:
         return float(np.ptp(self.points[:, :2], axis=0).max())
 
 
+def yaw_pitch(R_cam_head: Float[Array, "3 3"]) -> tuple[float, float]:
+    """Radians: the head turned to its own left, and tipped down, as the camera sees it."""
+    x, y, z = R_cam_head[:, 2]
+    return float(np.arctan2(x, -z)), float(np.arcsin(np.clip(y, -1.0, 1.0)))
+
+
 class FaceNetwork:
     """The network, loaded once (0.3 s). Use as a context manager, or call `close`.
 
@@ -67,7 +130,6 @@ class FaceNetwork:
                     num_faces=MAX_FACES,
                 )
             )
-        self.blendshape_names: tuple[str, ...] = ()
 
     def __enter__(self) -> Self:
         return self

@@ -13,7 +13,8 @@ import numpy as np
 
 from mien.arrays import Array, UInt8, check_image, check_positive, frozen
 from mien.capture.exif import focal_prior_px, orientation
-from mien.errors import FileFormatError, InputError
+from mien.capture.files import check_readable, kind_of, one_line
+from mien.errors import FileFormatError
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -104,12 +105,25 @@ def load_photo(path: str | Path, *, max_side: int = MAX_SIDE) -> Photo:
     return Photo(path.name, path, pixels, focal, original, tuple(notes))
 
 
+def shrunk(pixels: UInt8[Array, "h w 3"], side: int) -> UInt8[Array, "h w 3"]:
+    """At most `side` px long, by averaging; the same array when it is that already."""
+    import cv2
+
+    height, width = pixels.shape[:2]
+    factor = side / max(height, width)
+    if factor >= 1:
+        return pixels
+    size = max(1, round(width * factor)), max(1, round(height * factor))
+    small: Array = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    return small
+
+
 @contextmanager
 def _opened(path: Path, notes: list[str]) -> Iterator[Image]:
     """The file as a Pillow image; whatever goes wrong while it is open becomes one clear line."""
     from PIL import Image, UnidentifiedImageError
 
-    _check_readable(path)
+    check_readable(path, "a photo")
     _register_heif()
     with warnings.catch_warnings(record=True) as caught:
         # Pillow warns about damaged metadata and large pictures; the first is worth a note.
@@ -125,42 +139,18 @@ def _opened(path: Path, notes: list[str]) -> Iterator[Image]:
         except Image.DecompressionBombError:
             raise _too_large(path, "more") from None
         except UnidentifiedImageError:
-            problem = f"expected an image (JPEG, PNG, HEIC, ...), found {_kind_of(path)}"
+            problem = f"expected an image (JPEG, PNG, HEIC, ...), found {kind_of(path)}"
             raise FileFormatError(path, problem) from None
         except Exception as error:
             # Decoders raise whatever a damaged byte leads them to.
-            problem = f"expected a whole image, found a damaged one ({_one_line(error)})"
+            problem = f"expected a whole image, found a damaged one ({one_line(error)})"
             raise FileFormatError(path, problem) from error
-    notes += [f"odd file: {_one_line(warning.message)}" for warning in caught]
-
-
-def _check_readable(path: Path) -> None:
-    try:
-        with path.open("rb") as file:
-            empty = not file.read(1)
-    except FileNotFoundError:
-        raise InputError(path, "a photo", "no such file") from None
-    except IsADirectoryError:
-        raise InputError(path, "a photo", "a folder") from None
-    except OSError as error:
-        raise InputError(path, "a readable photo", error.strerror or error) from None
-    if empty:
-        raise FileFormatError(path, "expected an image, found an empty file")
+    notes += [f"odd file: {one_line(warning.message)}" for warning in caught]
 
 
 def _too_large(path: Path, found: str) -> FileFormatError:
     limit = f"{MAX_PIXELS // 1_000_000} megapixels"
     return FileFormatError(path, f"expected at most {limit}, found {found}")
-
-
-def _kind_of(path: Path) -> str:
-    with path.open("rb") as file:
-        head = file.read(512)
-    return "a text file" if all(32 <= b < 127 or b in b"\t\r\n" for b in head) else "something else"
-
-
-def _one_line(message: object) -> str:
-    return " ".join(str(message).split())
 
 
 def _register_heif() -> None:

@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+
 from mien.capture.annotations import AnnotationNames, Annotations, load_annotations
 from mien.capture.detector import LandmarkDetector
+from mien.capture.duplicates import same_photo
+from mien.capture.folder import (
+    ANNOTATIONS,
+    NEUTRAL,
+    ignored_files,
+    orphaned_annotations,
+    photo_files,
+)
 from mien.capture.landmarks import Landmarks
-from mien.capture.photos import MAX_SIDE, PHOTO_SUFFIXES, Photo, load_photo
-from mien.errors import EstimationError, InputError
+from mien.capture.mediapipe_face import yaw_pitch
+from mien.capture.photos import MAX_SIDE, Photo, load_photo
+from mien.capture.video import VIDEO_SUFFIXES, pick_frames
+from mien.errors import EstimationError
 
 Progress = Callable[[int, int], None]
 """Called with the number of steps done and their total."""
 
-NEUTRAL = "neutral"
-ANNOTATIONS = "annotations"
+_ONE_VIEWPOINT = 10.0
 
 
 @dataclass(frozen=True)
@@ -42,8 +52,8 @@ class Capture:
 
     Attributes:
         name: of the source, without an ending.
-        expressions: views by expression, never empty; a source without expression folders holds
-            the one expression `neutral`.
+        expressions: views by expression, never empty, `neutral` first where there is one; a source
+            without expression folders holds `neutral` alone.
         notes: what was left out, adapted or looks odd; each names its file.
     """
 
@@ -62,79 +72,121 @@ def load_capture(
     *,
     max_side: int = MAX_SIDE,
     face: int | None = None,
+    frames: int = 7,
     names: AnnotationNames | None = None,
     progress: Progress | None = None,
 ) -> Capture:
-    """A folder of photos, a folder of expression folders, or one photo, with all that is known.
+    """Photos from a folder, expression folders, one photo or a video, with all that is known.
+
+    A photo without a usable face and without annotations is left out, and a note says so.
 
     Args:
-        source: a folder of photos, a folder of one folder an expression, or a photo.
+        source: a folder of photos, a folder of one folder an expression, a photo or a video.
         max_side: larger photos are reduced to this many px on the longer side.
         face: which face to take where there are several, from left to right from 1; None takes
             the largest.
+        frames: how many frames of a video to use at most.
         names: what annotations may name; None takes the generic head's names.
-        progress: told after every photo.
+        progress: told after every photo or frame.
     Raises:
         InputError: there is nothing at `source`, or no photo in it.
-        FileFormatError: a photo or an annotation file is damaged.
+        FileFormatError: a photo, a video or an annotation file is damaged.
         EstimationError: no photo shows a face.
     """
     source = Path(source)
-    folders = _expression_files(source)
-    notes = _ignored_files(source)
-    total, done = sum(map(len, folders.values())), 0
-    expressions: dict[str, tuple[View, ...]] = {}
     with LandmarkDetector() as detector:
-        for expression, paths in folders.items():
+        reader = _Reader(detector, max_side, face, names, progress)
+        if source.is_file() and source.suffix.lower() in VIDEO_SUFFIXES:
+            expressions = reader.from_video(source, frames)
+        else:
+            expressions = reader.from_photos(source)
+    expressions = {name: views for name, views in expressions.items() if views}
+    if not expressions:
+        reasons = [note for note in reader.notes if "left out" in note]
+        raise EstimationError(
+            f"{source}: no photo shows a face that can be used ({'; '.join(reasons[:3])})"
+        )
+    notes = (*reader.notes, *_viewpoint_notes(expressions))
+    name = source.stem if source.is_file() else source.resolve().name
+    return Capture(name, expressions, notes)
+
+
+class _Reader:
+    """The options and the notes of one call of `load_capture`."""
+
+    def __init__(
+        self,
+        detector: LandmarkDetector,
+        max_side: int,
+        face: int | None,
+        names: AnnotationNames | None,
+        progress: Progress | None,
+    ) -> None:
+        self.detector, self.max_side, self.face = detector, max_side, face
+        self.names, self.progress = names, progress
+        self.notes: list[str] = []
+
+    def from_photos(self, source: Path) -> dict[str, tuple[View, ...]]:
+        """Every photo of every expression, each with the annotations beside it."""
+        files = photo_files(source)
+        self.notes += ignored_files(source)
+        total, done = sum(map(len, files.values())), 0
+        expressions: dict[str, tuple[View, ...]] = {}
+        for expression, paths in files.items():
             views: list[View] = []
             for path in paths:
-                view, said = _load_view(path, detector, max_side, face, names)
-                notes += [f"{path.name}: {note}" for note in said]
-                if view is not None:
-                    views.append(view)
+                photo = load_photo(path, max_side=self.max_side)
+                self._add(views, photo, self._annotations_of(path, photo))
                 done += 1
-                if progress is not None:
-                    progress(done, total)
-            if views:
-                expressions[expression] = tuple(views)
-    if not expressions:
-        raise EstimationError(f"{source}: none of its photos shows a face that can be used")
-    return Capture(
-        source.stem if source.is_file() else source.resolve().name, expressions, tuple(notes)
-    )
+                if self.progress is not None:
+                    self.progress(done, total)
+            self.notes += orphaned_annotations(paths)
+            expressions[expression] = tuple(views)
+        return expressions
 
+    def from_video(self, source: Path, count: int) -> dict[str, tuple[View, ...]]:
+        """The chosen frames as the one expression `neutral`."""
+        photos, notes = pick_frames(
+            source,
+            count=count,
+            detector=self.detector,
+            max_side=self.max_side,
+            progress=self.progress,
+        )
+        self.notes += [f"{source.name}: {note}" for note in notes]
+        views: list[View] = []
+        for photo in photos:
+            self._add(views, photo, None)
+        return {NEUTRAL: tuple(views)}
 
-def _load_view(
-    path: Path,
-    detector: LandmarkDetector,
-    max_side: int,
-    face: int | None,
-    names: AnnotationNames | None,
-) -> tuple[View | None, list[str]]:
-    """The view, or None when neither detector nor annotations tell where the face is."""
-    photo = load_photo(path, max_side=max_side)
-    notes = list(photo.notes)
-    annotations = _annotations_beside(path, photo, names)
-    try:
-        landmarks = detector.detect(photo, face=face)
-    except EstimationError as error:
-        reason = str(error).removeprefix(f"{photo.name}: ")
-        if annotations is None:
-            return None, [*notes, f"left out: {reason}"]
+    def _add(self, views: list[View], photo: Photo, annotations: Annotations | None) -> None:
+        """The photo as another view, unless it shows no face or is there already."""
+        notes = list(photo.notes)
         landmarks = None
-        notes.append(f"{reason}; its annotations alone are used")
-    notes += landmarks.notes if landmarks else ()
-    notes += annotations.notes if annotations else ()
-    return View(photo, landmarks, annotations), notes
+        try:
+            landmarks = self.detector.detect(photo, face=self.face)
+            notes += landmarks.notes
+        except EstimationError as error:
+            reason = str(error).removeprefix(f"{photo.name}: ")
+            notes.append(
+                f"left out: {reason}" if annotations is None else f"{reason}; annotations only"
+            )
+        if annotations is not None:
+            notes += annotations.notes
+        if landmarks is not None or annotations is not None:
+            view = View(photo, landmarks, annotations)
+            twin = next((other for other in views if same_photo(view, other)), None)
+            if twin is None or annotations is not None:
+                views.append(view)
+            else:
+                notes.append(f"left out: the same photo as {twin.photo.name}")
+        self.notes += [f"{photo.name}: {note}" for note in notes]
 
-
-def _annotations_beside(
-    path: Path, photo: Photo, names: AnnotationNames | None
-) -> Annotations | None:
-    file = path.parent / ANNOTATIONS / f"{path.stem}.json"
-    if not file.is_file():
-        return None
-    return load_annotations(file, photo, names=names or _generic_names()) or None
+    def _annotations_of(self, path: Path, photo: Photo) -> Annotations | None:
+        file = path.parent / ANNOTATIONS / f"{path.stem}.json"
+        if not file.is_file():
+            return None
+        return load_annotations(file, photo, names=self.names or _generic_names()) or None
 
 
 @cache
@@ -144,61 +196,17 @@ def _generic_names() -> AnnotationNames:
     return AnnotationNames.of(load_generic_head())
 
 
-def _expression_files(source: Path) -> dict[str, list[Path]]:
-    """Photos by expression, `neutral` first, each in natural order."""
-    if source.is_file():
-        return {NEUTRAL: [source]}
-    if not source.is_dir():
-        raise InputError(source, "a photo, a video or a folder of photos", "nothing there")
-    photos = _photos_in(source)
-    if photos:
-        return {NEUTRAL: photos}
-    folders = {folder.name: _photos_in(folder) for folder in _subfolders(source)}
-    folders = {name: paths for name, paths in folders.items() if paths}
-    if not folders:
-        raise InputError(source, "photos in this folder or in folders within", "none")
-    return dict(sorted(folders.items(), key=lambda item: item[0].lower() != NEUTRAL))
-
-
-def _ignored_files(source: Path) -> list[str]:
-    """A note on files that are no photos; hidden ones need none."""
-    if not source.is_dir():
-        return []
-    folders = [source] if _photos_in(source) else [source, *_subfolders(source)]
-    ignored = [
-        str(path.relative_to(source))
-        for folder in folders
-        for path in _listed(folder)
-        if path.is_file() and not _is_photo(path)
-    ]
-    if not ignored:
-        return []
-    shown = ", ".join(ignored[:5]) + (", ..." if len(ignored) > 5 else "")
-    return [f"{len(ignored)} files that are no photos were ignored: {shown}"]
-
-
-def _photos_in(folder: Path) -> list[Path]:
-    return [path for path in _listed(folder) if path.is_file() and _is_photo(path)]
-
-
-def _subfolders(folder: Path) -> list[Path]:
-    return [path for path in _listed(folder) if path.is_dir() and path.name != ANNOTATIONS]
-
-
-def _is_photo(path: Path) -> bool:
-    return path.suffix.lower() in PHOTO_SUFFIXES
-
-
-def _listed(folder: Path) -> list[Path]:
-    """What is not hidden, in natural order: photo_2 before photo_10."""
-    try:
-        paths = [path for path in folder.iterdir() if not path.name.startswith(".")]
-    except OSError as error:
-        raise InputError(folder, "a readable folder", error.strerror or error) from None
-    return sorted(paths, key=lambda path: natural_key(path.name))
-
-
-def natural_key(name: str) -> list[tuple[int, int | str]]:
-    """A sorting key in which digits count as numbers."""
-    parts = re.split(r"(\d+)", name.lower())
-    return [(0, int(part)) if part.isdigit() else (1, part) for part in parts if part]
+def _viewpoint_notes(expressions: dict[str, tuple[View, ...]]) -> list[str]:
+    """A note where several photos show the head from one side only."""
+    notes = []
+    for name, views in expressions.items():
+        poses = [yaw_pitch(view.landmarks.R_cam_head) for view in views if view.landmarks]
+        if len(poses) < 2 or len(poses) < len(views):
+            continue
+        span = np.degrees(np.ptp(poses, axis=0))
+        if span.max() < _ONE_VIEWPOINT:
+            notes.append(
+                f"{name}: its {len(views)} photos look from nearly one side (yaw spans "
+                f"{span[0]:.0f} degrees, pitch {span[1]:.0f}): they say little about depth"
+            )
+    return notes

@@ -1,0 +1,243 @@
+"""Frames of a video, upright, and the choice of those that serve as photos."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mien.arrays import Array, UInt8, check_positive
+from mien.capture.detector import LandmarkDetector
+from mien.capture.files import check_readable, kind_of, one_line
+from mien.capture.frame_choice import FrameScores, choose_frames
+from mien.capture.mediapipe_face import DetectedFace, yaw_pitch
+from mien.capture.photos import MAX_PIXELS, MAX_SIDE, Photo, shrunk
+from mien.errors import EstimationError, FileFormatError
+
+if TYPE_CHECKING:
+    from av import VideoFrame
+    from av.container import InputContainer
+    from av.video.stream import VideoStream
+
+VIDEO_SUFFIXES = frozenset((".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mts", ".3gp"))
+
+MAX_SAMPLES = 240
+_SAMPLE_SECONDS = 0.1
+_ANALYSIS_SIDE = 640
+_SHARPNESS_SIDE = 192
+_USUAL_RATE = 25
+_PQ, _HLG = 16, 18
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One decoded picture, not yet converted.
+
+    Attributes:
+        index: from 0, in order of display.
+        seconds: since the clip's beginning.
+        pixel_aspect: width of a stored pixel over its height.
+        raw: as the decoder gave it.
+    """
+
+    index: int
+    seconds: float
+    pixel_aspect: float
+    raw: VideoFrame
+
+    @property
+    def hdr(self) -> bool:
+        """Coded for a brighter range than sRGB's, which shifts its colours here."""
+        return self.raw.color_trc in (_PQ, _HLG)
+
+    def pixels(self) -> UInt8[Array, "h w 3"]:
+        """(H, W, 3) sRGB with square pixels, the container's rotation flag applied."""
+        width = max(1, round(self.raw.width * self.pixel_aspect))
+        stored = self.raw.to_ndarray(format="rgb24", width=width, height=self.raw.height)
+        # The flag counts degrees counterclockwise, as numpy does quarter turns.
+        return np.ascontiguousarray(np.rot90(stored, round(self.raw.rotation / 90)))
+
+
+@dataclass
+class Video:
+    """A clip that is being read.
+
+    Attributes:
+        path: the file.
+        notes: grows while frames are read: a stream that breaks, frames that cannot be decoded.
+    """
+
+    path: Path
+    notes: list[str] = field(default_factory=list)
+
+    def frames(self) -> Iterator[Frame]:
+        """Every frame in order of display. A stream that breaks half-way ends there, with a note.
+
+        Raises: InputError, FileFormatError: not a video, no frames, too large.
+        """
+        import av
+
+        count = 0
+        with self._opened() as container:
+            stream = self._stream(container)
+            aspect = float(stream.sample_aspect_ratio or 1)
+            rate = float(stream.average_rate or _USUAL_RATE)
+            try:
+                for raw in container.decode(stream):
+                    seconds = count / rate if raw.time is None else raw.time
+                    yield Frame(count, seconds, aspect, raw)
+                    count += 1
+            except av.FFmpegError as error:
+                reason = one_line(error.strerror or error)
+                self._note(f"the stream breaks after {count} frames ({reason})")
+            if count and stream.frames > count + 2:
+                self._note(f"{count} of the {stream.frames} frames that it states can be read")
+        if not count:
+            raise FileFormatError(self.path, "expected a video, found no frame that can be read")
+
+    def length(self) -> tuple[int, float | None]:
+        """Number of frames (0: unknown) and seconds (None: unknown), as the file states them."""
+        with self._opened() as container:
+            stream = self._stream(container)
+            seconds = container.duration / 1e6 if container.duration else None
+            count = stream.frames
+            if not count and seconds and stream.average_rate:
+                count = round(seconds * float(stream.average_rate))
+            return count, seconds
+
+    def _note(self, note: str) -> None:
+        if note not in self.notes:
+            self.notes.append(note)
+
+    def _opened(self) -> InputContainer:
+        import av
+
+        check_readable(self.path, "a video")
+        try:
+            return av.open(str(self.path), metadata_errors="replace")
+        except av.FFmpegError as error:
+            found = f"{kind_of(self.path)} ({one_line(error.strerror or error)})"
+            raise FileFormatError(self.path, f"expected a video, found {found}") from None
+
+    def _stream(self, container: InputContainer) -> VideoStream:
+        if not container.streams.video:
+            raise FileFormatError(self.path, "expected a video, found no picture track in it")
+        stream = container.streams.video[0]
+        stream.thread_type = "AUTO"
+        if stream.width * stream.height > MAX_PIXELS:
+            found = f"{stream.width}x{stream.height}"
+            limit = f"at most {MAX_PIXELS // 1_000_000} megapixels"
+            raise FileFormatError(self.path, f"expected {limit} a frame, found {found}")
+        return stream
+
+
+def pick_frames(
+    path: str | Path,
+    *,
+    count: int = 7,
+    detector: LandmarkDetector,
+    max_side: int = MAX_SIDE,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[tuple[Photo, ...], tuple[str, ...]]:
+    """Sharp frames with diverse poses of the head and a like expression, and notes.
+
+    The clip is decoded twice: once to judge up to 240 frames (10 a second at most), once to fetch
+    the chosen ones, so that memory stays small however long and large it is.
+
+    Args:
+        count: as many at most; fewer when the head turns little.
+        progress: told (done, total) frames of both passes; the total is an estimate.
+    Returns: photos named `frame_000123.png` by the frame's number from 0, and what was odd.
+    Raises:
+        InputError: no such file, not readable, `count` not positive.
+        FileFormatError: not a video, or no frame in it.
+        EstimationError: no face in any frame.
+    """
+    check_positive("count", count)
+    video = Video(Path(path))
+    report = _two_passes(progress, video.length()[0])
+    scores = _judge(video, detector, report)
+    wanted = scores.index[choose_frames(scores, count)]
+    photos = tuple(_fetch(video, set(wanted.tolist()), max_side, report))
+    yaw = np.degrees(scores.pose[np.isin(scores.index, wanted), 0])
+    span = f"the head turns by {np.ptp(yaw):.0f} degrees in them"
+    video.notes.append(f"{len(photos)} of {len(scores.index)} judged frames chosen: {span}")
+    return photos, tuple(video.notes)
+
+
+def _two_passes(
+    progress: Callable[[int, int], None] | None, frames: int
+) -> Callable[[int, int], None]:
+    """Progress of pass 0 or 1 at a frame as (done, total) of both."""
+    if progress is None:
+        return lambda step, frame: None
+
+    def report(step: int, frame: int) -> None:
+        total = 2 * max(frames, frame + 1)
+        progress(min(step * total // 2 + frame + 1, total), total)
+
+    return report
+
+
+def _judge(
+    video: Video, detector: LandmarkDetector, report: Callable[[int, int], None]
+) -> FrameScores:
+    """Scores of the frames, evenly spread in time, that show a face."""
+    seconds = video.length()[1]
+    step = max(_SAMPLE_SECONDS, (seconds or 0) / MAX_SAMPLES)
+    rows: list[tuple[int, float, DetectedFace]] = []
+    due = -np.inf
+    for frame in video.frames():
+        report(0, frame.index)
+        if frame.index == 0 and frame.hdr:
+            video.notes.append("HDR video: its colours are approximate")
+        # A clock that jumps back (a joined clip) must not end the sampling.
+        if due - 2 * step < frame.seconds < due:
+            continue
+        due = frame.seconds + step
+        pixels = frame.pixels()
+        found = detector.detect_fast(shrunk(pixels, _ANALYSIS_SIDE))
+        if found is not None:
+            rows.append((frame.index, _sharpness(pixels, found), found))
+    if not rows:
+        raise EstimationError(f"{video.path}: no face found in any of its frames")
+    faces = [face for _, _, face in rows]
+    return FrameScores(
+        np.array([index for index, _, _ in rows]),
+        np.array([sharpness for _, sharpness, _ in rows]),
+        np.array([yaw_pitch(face.R_cam_head) for face in faces]),
+        np.array([face.blendshapes for face in faces]),
+    )
+
+
+def _sharpness(pixels: UInt8[Array, "h w 3"], face: DetectedFace) -> float:
+    """Variance of the Laplacian over the face, at one size for all and free of contrast."""
+    import cv2
+
+    factor = max(pixels.shape) / min(max(pixels.shape), _ANALYSIS_SIDE)
+    low = np.maximum(face.points[:, :2].min(axis=0) * factor, 0).astype(int)
+    high = np.ceil(face.points[:, :2].max(axis=0) * factor).astype(int)
+    crop = shrunk(pixels[low[1] : high[1], low[0] : high[0]], _SHARPNESS_SIDE)
+    if crop.size == 0:
+        return 0.0
+    grey = cv2.cvtColor(np.ascontiguousarray(crop), cv2.COLOR_RGB2GRAY).astype(np.float64)
+    return float(cv2.Laplacian(grey, cv2.CV_64F).var() / (grey.var() + 1.0))
+
+
+def _fetch(
+    video: Video, wanted: set[int], max_side: int, report: Callable[[int, int], None]
+) -> Iterator[Photo]:
+    """The wanted frames as photos."""
+    last = max(wanted)
+    for frame in video.frames():
+        report(1, frame.index)
+        if frame.index in wanted:
+            pixels = frame.pixels()
+            size = pixels.shape[1], pixels.shape[0]
+            name = f"frame_{frame.index:06d}.png"
+            yield Photo(name, video.path, shrunk(pixels, max_side), original_size=size)
+        if frame.index == last:
+            return
