@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mien.arrays import Array, Bool, Float
+from mien.arrays import Array, Bool
 from mien.errors import InputError
 from mien.mesh import Mesh
-from mien.numeric.pyramid import fill_pyramid
 from mien.numeric.raster import rasterize
 from mien.texture.surface import SurfaceMap, surface_from
 
@@ -29,24 +28,20 @@ def atlas_surface(
     return surface_from(mesh, ids, raster.barycentrics)
 
 
-def fill_gutters(
-    pixels: Float[Array, "h w c"], inside: Bool[Array, "h w"], *, rounds: int = 4
-) -> Float[Array, "h w c"]:
+def fill_gutters(pixels: Array, inside: Bool[Array, "h w"]) -> Array:
     """Colours continued beyond the charts, so that filtered lookups at their edges see no seam.
 
-    Args:
-        rounds: px around each chart that take the mean of the chart's own nearest pixels; what
-            is left further out is smooth and only matters to coarse mip levels.
+    Every pixel outside takes the colour of the nearest one inside, (H, W, C) of the same type.
+    Raises: InputError: nothing is inside.
     """
     import cv2
 
-    filled, known = pixels.astype(np.float32), inside.astype(np.float32)
-    kernel = np.ones((3, 3), np.float32)
-    for _ in range(rounds):
-        count = cv2.filter2D(known, -1, kernel, borderType=cv2.BORDER_CONSTANT)
-        grown = (count > 0) & (known == 0)
-        sums = cv2.filter2D(filled * known[..., None], -1, kernel, borderType=cv2.BORDER_CONSTANT)
-        filled[grown] = sums[grown] / count[grown][:, None]
-        known = (count > 0).astype(np.float32)
-    result: Array = fill_pyramid(filled, known)
-    return result
+    if not inside.any():
+        raise InputError("inside", "at least one pixel", "none")
+    _, labels = cv2.distanceTransformWithLabels(
+        (~inside).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    nearest = np.zeros(labels.max() + 1, np.intp)
+    nearest[labels[inside]] = np.flatnonzero(inside)
+    filled: Array = pixels.reshape(-1, pixels.shape[2])[nearest[labels]]
+    return filled

@@ -82,6 +82,17 @@ def restricted(surface: SurfaceMap, keep: Bool[Array, "h w"]) -> SurfaceMap:
     return SurfaceMap(surface.points, surface.normals, ids, surface.barycentrics, surface.wrap)
 
 
+def cropped(surface: SurfaceMap, box: tuple[slice, slice]) -> SurfaceMap:
+    """The rectangle of texels in the given rows and columns."""
+    return SurfaceMap(
+        surface.points[box],
+        surface.normals[box],
+        surface.triangle_ids[box],
+        surface.barycentrics[box],
+        surface.wrap,
+    )
+
+
 def mirrored(surface: SurfaceMap, mesh: Mesh, mirror: Int[Array, " v"]) -> SurfaceMap:
     """For every texel the place on the other side of the head that looks like it.
 

@@ -1,0 +1,152 @@
+"""Images of a head: textured, in vertex colours or plainly shaded, with alpha."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mien.arrays import Array, Float, UInt8, check_array, check_image
+from mien.camera import Camera
+from mien.errors import InputError
+from mien.mesh import Mesh
+from mien.numeric.raster import Raster, interpolate, rasterize
+from mien.render.mipmap import sample_texture
+
+SAMPLES = (1, 4, 9)
+
+
+@dataclass(frozen=True)
+class Light:
+    """Diffuse light on an untextured head: a key, a weaker fill, and what comes from everywhere.
+
+    Attributes:
+        key, fill: (3,) directions towards the lights in camera space (x right, y down, z forward).
+        key_strength, fill_strength, ambient: their sum is the brightest that a surface can be.
+    """
+
+    key: tuple[float, float, float] = (-0.5, -0.6, -1.0)
+    fill: tuple[float, float, float] = (0.8, 0.1, -0.6)
+    key_strength: float = 0.6
+    fill_strength: float = 0.2
+    ambient: float = 0.2
+
+
+# What an artist's clay looks like; a face detector finds a face in it, too.
+CLAY = (205.0, 172.0, 152.0)
+
+
+def render(
+    mesh: Mesh,
+    camera: Camera,
+    texture: UInt8[Array, "h w 3"] | None = None,
+    *,
+    vertex_colours: Float[Array, "v 3"] | None = None,
+    parts: tuple[str, ...] | None = None,
+    samples: int = 1,
+    light: Light | None = None,
+    background: tuple[int, int, int] | UInt8[Array, "h w 3"] | None = None,
+) -> UInt8[Array, "h w 4"]:
+    """(H, W, 4) uint8 sRGB with straight alpha, as the camera sees the mesh.
+
+    Args:
+        texture: by the mesh's texture coordinates; filtered where it is seen smaller than it is.
+        vertex_colours: (V, 3) from 0 to 255 instead; with neither, the head is of clay.
+        parts: names of the parts to show; by default all but the hair cap and the lashes.
+        samples: per pixel, 1, 4 or 9: more make smooth edges.
+        light: shades the head; by default one of clay, and photographed colours as they are, since
+            photos have their light in them.
+        background: a colour or an image; alpha is then 255 everywhere.
+    Raises: InputError: shapes, a texture on a mesh without texture coordinates, unknown parts.
+    """
+    if samples not in SAMPLES:
+        raise InputError("samples", " or ".join(map(str, SAMPLES)), samples)
+    if texture is not None and vertex_colours is not None:
+        raise InputError("vertex_colours", "only one of them and texture", "both")
+    factor = int(np.sqrt(samples))
+    large = _enlarged(camera, factor)
+    shown = mesh.submesh(mesh.triangles_of(*(shown_parts(mesh) if parts is None else parts)))
+    raster = rasterize_mesh(shown, large)
+    if texture is not None:
+        pixels = project_safely(shown, large)
+        colours = sample_texture(shown, pixels, raster, check_image("texture", texture))
+    elif vertex_colours is not None:
+        values = check_array("vertex_colours", vertex_colours, (len(mesh.vertices), 3))
+        colours = interpolate(raster, shown.triangles, values)
+    else:
+        colours = np.broadcast_to(np.array(CLAY, np.float32), (*raster.depth.shape, 3))
+        light = light or Light()
+    if light is not None:
+        colours = colours * _shading(shown, raster, large, light)[..., None]
+    image = _reduced(colours, raster.mask, factor)
+    return image if background is None else over_background(image, background)
+
+
+def shown_parts(mesh: Mesh) -> tuple[str, ...]:
+    """The parts that pictures show by default: not the hair cap, a helper, and not the lashes,
+    which are opaque sheets."""
+    return tuple(name for name in mesh.part_names if name not in ("hair", "lashes"))
+
+
+def rasterize_mesh(mesh: Mesh, camera: Camera, *, cull: bool = False) -> Raster:
+    """The mesh as the camera sees it (numeric.raster.rasterize in the camera's pixels)."""
+    depth, pixels = camera.to_camera(mesh.vertices)[:, 2], project_safely(mesh, camera)
+    return rasterize(pixels, depth, mesh.triangles, camera.width, camera.height, cull=cull)
+
+
+def project_safely(mesh: Mesh, camera: Camera) -> Float[Array, "v 2"]:
+    """(V, 2) px of the vertices; not finite for one in the camera's own plane."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return camera.project(mesh.vertices)
+
+
+def over_background(
+    image: UInt8[Array, "h w 4"], background: tuple[int, int, int] | UInt8[Array, "h w 3"]
+) -> UInt8[Array, "h w 4"]:
+    """The image over a colour or another image, opaque. Raises: InputError: sizes that differ."""
+    below = np.asarray(background, np.float32)
+    if below.shape not in ((3,), (*image.shape[:2], 3)):
+        expected = f"a colour or an image of {image.shape[1]}x{image.shape[0]} px"
+        raise InputError("background", expected, f"shape {below.shape}")
+    alpha = image[..., 3:].astype(np.float32) / 255
+    mixed = np.rint(below + alpha * (image[..., :3] - below)).astype(np.uint8)
+    opaque = np.full((*image.shape[:2], 1), 255, np.uint8)
+    return np.concatenate([mixed, opaque], axis=2)
+
+
+def _shading(mesh: Mesh, raster: Raster, camera: Camera, light: Light) -> Float[Array, "h w"]:
+    """(H, W) brightness by Lambert's law; the back of a surface is lit like its front."""
+    normals = interpolate(raster, mesh.triangles, mesh.vertex_normals() @ camera.R_cam_head.T)
+    normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-6)
+    normals *= np.where(normals[..., 2:] > 0, -1, 1)
+    brightness: Array = np.full(raster.depth.shape, light.ambient, np.float32)
+    for direction, strength in ((light.key, light.key_strength), (light.fill, light.fill_strength)):
+        towards = np.asarray(direction, np.float32)
+        towards /= np.linalg.norm(towards)
+        brightness += np.float32(strength) * np.maximum(normals @ towards, 0)
+    return brightness
+
+
+def _enlarged(camera: Camera, factor: int) -> Camera:
+    if factor == 1:
+        return camera
+    return replace(
+        camera,
+        width=camera.width * factor,
+        height=camera.height * factor,
+        focal_px=camera.focal_px * factor,
+        principal_px=camera.principal * factor,
+    )
+
+
+def _reduced(colours: Array, mask: Array, factor: int) -> UInt8[Array, "h w 4"]:
+    """Means over factor x factor pixels; colours are those of the head alone."""
+    height, width = mask.shape[0] // factor, mask.shape[1] // factor
+    blocks = (height, factor, width, factor)
+    covered = mask.reshape(blocks).sum(axis=(1, 3), dtype=np.float32)
+    inside = np.where(mask[..., None], colours, 0).astype(np.float32)
+    sums = inside.reshape(*blocks, 3).sum(axis=(1, 3))
+    image = np.empty((height, width, 4), np.float32)
+    image[..., :3] = sums / np.maximum(covered, 1)[..., None]
+    image[..., 3] = covered * (255 / factor**2)
+    return np.clip(np.rint(image), 0, 255).astype(np.uint8)

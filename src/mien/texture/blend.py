@@ -1,0 +1,129 @@
+"""Photos blended on a surface, each weighted by g_k = F_k P_k."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from mien.arrays import Array, Float, frozen
+from mien.numeric.sample import bilinear_place
+from mien.numeric.threads import for_row_bands
+from mien.texture.surface import SurfaceMap
+from mien.texture.visibility import Sight, View, camera_numbers, project_point, sight
+
+# Certainties (cosines) between which a view's colours fade out: a texel that is seen at 80
+# degrees or more is a smear, at 70 degrees it is as good as its surroundings.
+_FADE = (0.17, 0.34)
+
+
+@dataclass(frozen=True)
+class Blend:
+    """The photos' colours on a surface.
+
+    Attributes:
+        colours: (H, W, 3) float32, 0 to 255; the weighted mean of the photos, zero where none sees.
+        coverage: (H, W) float32, the sum of the weights g_k.
+        confidence: (H, W) float32 in [0, 1]: how far the colour may stand by itself; below 1 it is
+            to be mixed with what fills the holes.
+    """
+
+    colours: Float[Array, "h w 3"]
+    coverage: Float[Array, "h w"]
+    confidence: Float[Array, "h w"]
+
+
+def blend_views(
+    surface: SurfaceMap,
+    views: Sequence[View],
+    gains: Float[Array, "k 3"] | None = None,
+    *,
+    feather_mm: float,
+    certainty_power: float,
+    weigh: Callable[[int, Float[Array, "h w"]], Float[Array, "h w"]] | None = None,
+) -> Blend:
+    """The convex combination of the photos on every texel (P02 sec. 5.2.1).
+
+    Args:
+        gains: (K, 3) factors on each photo's colours; 1 when None.
+        feather_mm: as for visibility.sight.
+        certainty_power: g_k = F_k P_k^power.
+        weigh: called with the index of a view and its g_k; returns the weights to use instead.
+    """
+    shape = surface.triangle_ids.shape
+    colours = np.zeros((*shape, 3), np.float32)
+    coverage, confidence = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+    for k, view in enumerate(views):
+        seen = sight(surface, view, feather_mm=feather_mm)
+        weights = view_weights(seen, certainty_power)
+        if weigh is not None:
+            weights = weigh(k, weights)
+        gain = np.ones(3) if gains is None else gains[k]
+        add_view(surface, view, weights, gain, colours)
+        coverage += weights
+        np.maximum(confidence, np.where(weights > 0, fade(seen), 0), out=confidence)
+    colours /= np.maximum(coverage, 1e-12)[..., None]
+    return Blend(colours, coverage, confidence)
+
+
+def view_weights(seen: Sight, certainty_power: float) -> Float[Array, "h w"]:
+    """(H, W) g_k = F_k P_k^power (P02 sec. 5.2.2, step 3)."""
+    if certainty_power == 1:
+        return seen.feathered * seen.certainty
+    weights: Array = seen.feathered * seen.certainty ** np.float32(certainty_power)
+    return weights
+
+
+def fade(seen: Sight) -> Float[Array, "h w"]:
+    """(H, W) in [0, 1]: how far one view's colour may stand by itself."""
+    low, high = _FADE
+    t = np.clip((seen.certainty - low) / (high - low), 0, 1)
+    faded: Array = seen.feathered * t
+    return faded
+
+
+def add_view(
+    surface: SurfaceMap,
+    view: View,
+    weights: Float[Array, "h w"],
+    gain: Float[Array, " 3"],
+    colours: Float[Array, "h w 3"],
+) -> None:
+    """Add weight x gain x photo to colours, (H, W, 3) float32, in place."""
+    arrays = (surface.points, weights.astype(np.float32), view.photo)
+    inputs = [frozen(np.ascontiguousarray(array)) for array in arrays]
+    pose, factor = camera_numbers(view.camera), frozen(np.asarray(gain, np.float32))
+
+    def rows(first: int, end: int) -> None:
+        _add_rows(*inputs, pose, factor, first, end, colours)
+
+    for_row_bands(rows, colours.shape[0], work=weights.size)
+
+
+@njit(cache=True, nogil=True)
+def _add_rows(
+    points: Array,
+    weights: Array,
+    photo: Array,
+    pose: Array,
+    gain: Array,
+    first: int,
+    end: int,
+    colours: Array,
+) -> None:
+    height, width = photo.shape[:2]
+    for row in range(first, end):
+        for col in range(weights.shape[1]):
+            weight = weights[row, col]
+            if weight <= 0.0:
+                continue
+            x, y, z = points[row, col]
+            px, py, _ = project_point(pose, x, y, z)
+            x0, x1, y0, y1, fx, fy = bilinear_place(px, py, width, height)
+            for c in range(3):
+                above = (1.0 - fx) * photo[y0, x0, c] + fx * photo[y0, x1, c]
+                below = (1.0 - fx) * photo[y1, x0, c] + fx * photo[y1, x1, c]
+                value = (1.0 - fy) * above + fy * below
+                colours[row, col, c] += weight * gain[c] * value

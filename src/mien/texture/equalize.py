@@ -1,0 +1,69 @@
+"""Differences of exposure and white balance between photos, evened out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.texture.blend import add_view, view_weights
+from mien.texture.surface import SurfaceMap
+from mien.texture.visibility import View, sight
+
+# Colours outside this range (of 255) tell little: dark ones are noise, bright ones are clipped.
+_RANGE = (16, 245)
+_FEWEST = 50
+
+
+def estimate_gains(
+    surface: SurfaceMap,
+    views: Sequence[View],
+    *,
+    feather_mm: float = 12.0,
+    certainty_power: float = 1.0,
+) -> Float[Array, "k 3"]:
+    """(K, 3) factors on each photo's colours that make photos agree where they overlap.
+
+    Args:
+        surface: a coarse map will do.
+    Returns: factors whose product over the photos is 1 in each channel. 1 for a photo that overlaps
+        with no other.
+
+    The logarithms of the factors fit the medians of the log ratios of all overlapping pairs, in the
+    least-squares sense, weighted by the overlap.
+    """
+    seen = [_samples(surface, view, feather_mm, certainty_power) for view in views]
+    count = len(views)
+    rows, targets = [], []
+    for j in range(count):
+        for k in range(j):
+            weight = np.minimum(seen[j][1], seen[k][1])
+            both = weight > 0.2
+            if both.sum() < _FEWEST:
+                continue
+            ratio = np.median(np.log(seen[j][0][both] / seen[k][0][both]), axis=0)
+            strength = np.sqrt(float(both.sum()))
+            row = np.zeros(count)
+            row[j], row[k] = -strength, strength
+            rows.append(row)
+            targets.append(strength * ratio)
+    if not rows:
+        return np.ones((count, 3))
+    # Of all solutions the one of least norm: its mean over photos that overlap is zero.
+    logs, *_ = np.linalg.lstsq(np.array(rows), np.array(targets), rcond=None)
+    gains: Array = np.exp(logs)
+    return gains
+
+
+def _samples(
+    surface: SurfaceMap, view: View, feather_mm: float, power: float
+) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
+    """Colours and weights on the texels of the surface; weight zero where they tell little."""
+    weights = view_weights(sight(surface, view, feather_mm=feather_mm), power)
+    colours = np.zeros((*weights.shape, 3), np.float32)
+    add_view(surface, view, (weights > 0).astype(np.float32), np.ones(3), colours)
+    low, high = _RANGE
+    useful = (colours.min(axis=2) > low) & (colours.max(axis=2) < high)
+    weights = np.where(useful, weights, 0)
+    return np.maximum(colours, 1).reshape(-1, 3), weights.reshape(-1)

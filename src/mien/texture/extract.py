@@ -1,0 +1,200 @@
+"""Photos to one texture: the view-independent texture map of P02 sec. 5.2.2."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mien.arrays import Array, Bool, Float, Int, UInt8, check_positive
+from mien.camera import Camera
+from mien.errors import EstimationError, InputError
+from mien.mesh import Mesh
+from mien.texture.atlas import fill_gutters
+from mien.texture.blend import Blend, blend_views
+from mien.texture.cylinder import Cylinder, cylinder_surface, fit_cylinder
+from mien.texture.equalize import estimate_gains
+from mien.texture.fill import FILLS, Fill, fill_image, from_cylinder, mix, over
+from mien.texture.parts import SEE_THROUGH, SKIN, STYLES, PartStyle, fill_colour
+from mien.texture.subject import subject_mask
+from mien.texture.surface import SurfaceMap, cropped, mirrored, parts_of, restricted
+from mien.texture.visibility import View, prepare_view
+
+# The coarse cylinder on which photos are compared and holes are filled: 1 mm or so.
+_COARSE = (512, 256)
+
+
+@dataclass(frozen=True)
+class Texture:
+    """Colours of a surface.
+
+    Attributes:
+        pixels: (H, W, 3) uint8 sRGB.
+        coverage: (H, W) float32, the summed weights g_k: 0 where no photo shows the texel.
+        gains: (K, 3) what each photo's colours were multiplied by.
+    """
+
+    pixels: UInt8[Array, "h w 3"]
+    coverage: Float[Array, "h w"]
+    gains: Float[Array, "k 3"]
+
+
+@dataclass(frozen=True)
+class _Job:
+    """Everything that the parts of one texture have in common."""
+
+    mesh: Mesh
+    views: list[View]
+    gains: Float[Array, "k 3"]
+    feather_mm: float
+    certainty_power: float
+    fill: Fill
+    mirror: Int[Array, " v"] | None
+
+
+def extract_texture(
+    mesh: Mesh,
+    cameras: Sequence[Camera],
+    photos: Sequence[UInt8[Array, "h w 3"]],
+    *,
+    surface: SurfaceMap,
+    feather_mm: float = 12.0,
+    certainty_power: float = 1.0,
+    equalize: bool = True,
+    fill: Fill = "pyramid",
+    mirror: Int[Array, " v"] | None = None,
+    find_subject: bool = True,
+) -> Texture:
+    """The colour of every texel, from the photos that see it.
+
+    Args:
+        mesh: as it was fitted to the photos.
+        cameras, photos: K of each, of the same sizes.
+        surface: which texels to colour (cylinder_surface or atlas_surface of this mesh).
+        feather_mm: width of the ramp that ends each photo's part, along the surface.
+        certainty_power: weights are F_k P_k^power; more makes the best photo win more clearly.
+        equalize: even out exposure and white balance between photos.
+        fill: what becomes of texels that no photo shows; black with "none".
+        mirror: (V,) left-right partners; then those texels take the other side's colours first.
+        find_subject: tell person from background in the photos; else trust the mesh's outline.
+    Raises: InputError: counts and sizes that differ. EstimationError: no photo sees the mesh.
+    Source: P02 sec. 5.2.1, 5.2.2. Differs: colours seen at a grazing angle fade into the filled
+        surroundings; the skin's holes are filled on the cylinder for any layout, so that no seam
+        shows; parts are done one by one (sec. 5.2.4).
+    """
+    job = _prepare(mesh, cameras, photos, surface, feather_mm, fill, find_subject)
+    job = replace(job, certainty_power=certainty_power, mirror=mirror)
+    cylinder = fit_cylinder(mesh)
+    skin = ("skin",) if "skin" in mesh.part_names else mesh.part_names
+    width, height = _COARSE
+    coarse = cylinder_surface(mesh, cylinder, width=width, height=height, parts=skin)
+    if equalize:
+        job = replace(job, gains=estimate_gains(coarse, job.views, feather_mm=feather_mm))
+    around = _blend(job, coarse, SKIN)
+    if not around.coverage.any():
+        raise EstimationError("no photo sees the head where its camera says it is")
+    below = around.colours if fill == "none" else fill_image(around, fill, wrap=True)
+    pixels = _background(surface, below)
+    coverage = np.zeros(surface.triangle_ids.shape, np.float32)
+    for name in mesh.part_names:
+        texels = parts_of(surface, mesh, name)
+        box = _box(texels, surface.wrap)
+        if box is None:
+            continue
+        part = restricted(cropped(surface, box), texels[box])
+        colours, weights = _texture_part(job, part, name, cylinder, below)
+        pixels[box][part.mask] = colours[part.mask]
+        coverage[box][part.mask] = weights[part.mask]
+    result = np.clip(np.rint(pixels), 0, 255).astype(np.uint8)
+    if fill != "none" and not surface.wrap:
+        result = fill_gutters(result, surface.mask)
+    return Texture(result, coverage, job.gains)
+
+
+def _prepare(
+    mesh: Mesh,
+    cameras: Sequence[Camera],
+    photos: Sequence[Array],
+    surface: SurfaceMap,
+    feather_mm: float,
+    fill: Fill,
+    find_subject: bool,
+) -> _Job:
+    if fill not in FILLS:
+        raise InputError("fill", " or ".join(FILLS), fill)
+    check_positive("feather_mm", feather_mm)
+    if len(cameras) != len(photos) or not cameras:
+        raise InputError("photos", f"{len(cameras)} of them, one a camera", len(photos))
+    names = [name for name in mesh.part_names if name not in SEE_THROUGH]
+    solid = mesh.submesh(mesh.triangles_of(*names))
+    views = []
+    for camera, photo in zip(cameras, photos, strict=True):
+        subject = subject_mask(solid, camera, photo) if find_subject else None
+        views.append(prepare_view(solid, camera, photo, texel_mm=surface.texel_mm, subject=subject))
+    return _Job(mesh, views, np.ones((len(views), 3)), feather_mm, 1.0, fill, None)
+
+
+def _texture_part(
+    job: _Job, surface: SurfaceMap, name: str, cylinder: Cylinder, below: Float[Array, "h w 3"]
+) -> tuple[Float[Array, "h w 3"], Float[Array, "h w"]]:
+    """Colours and coverage of one part; `below` is the filled skin on the coarse cylinder."""
+    style = STYLES.get(name, SKIN)
+    blend = _blend(job, surface, style)
+    if job.fill == "none":
+        return blend.colours, blend.coverage
+    if style.fill != "surface":
+        return mix(blend.colours, fill_colour(style, blend), blend.confidence), blend.coverage
+    colours = blend.colours.copy()
+    holes = surface.mask & (blend.confidence < 1)
+    filled = from_cylinder(below, cylinder, surface, holes)
+    share = blend.confidence[holes][:, None]
+    colours[holes] = filled + share * (colours[holes] - filled)
+    return colours, blend.coverage
+
+
+def _blend(job: _Job, surface: SurfaceMap, style: PartStyle) -> Blend:
+    """The photos on one part, the other side's colours below them when there is a mirror map."""
+    views, gains = job.views, job.gains
+    shape = surface.triangle_ids.shape
+    if style.photos == "none":
+        return Blend(np.zeros((*shape, 3), np.float32), *np.zeros((2, *shape), np.float32))
+
+    def blended(texels: SurfaceMap, chosen: list[int]) -> Blend:
+        return blend_views(
+            texels,
+            [views[k] for k in chosen],
+            gains[chosen],
+            feather_mm=min(job.feather_mm, style.feather_mm),
+            certainty_power=job.certainty_power,
+        )
+
+    everything = list(range(len(views)))
+    if style.photos == "best":
+        totals = [blended(surface, [k]).coverage.sum() for k in everything]
+        return blended(surface, [int(np.argmax(totals))])
+    blend = blended(surface, everything)
+    if job.mirror is None:
+        return blend
+    return over(blend, blended(mirrored(surface, job.mesh, job.mirror), everything))
+
+
+def _background(surface: SurfaceMap, below: Float[Array, "h w 3"]) -> Float[Array, "h w 3"]:
+    """(H, W, 3) float32: what texels without a surface show, before gutters are filled."""
+    import cv2
+
+    height, width = surface.triangle_ids.shape
+    if not surface.wrap:
+        return np.zeros((height, width, 3), np.float32)
+    wide: Array = cv2.resize(below, (width, height), interpolation=cv2.INTER_LINEAR)
+    return wide
+
+
+def _box(texels: Bool[Array, "h w"], wrap: bool) -> tuple[slice, slice] | None:
+    """The rectangle around the texels (the whole image when it wraps), None when there are none."""
+    rows, columns = np.flatnonzero(texels.any(axis=1)), np.flatnonzero(texels.any(axis=0))
+    if not len(rows):
+        return None
+    if wrap:
+        return slice(None), slice(None)
+    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
