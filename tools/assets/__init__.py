@@ -1,0 +1,1 @@
+"""Builds what ships in `src/mien/assets/data` from published packages."""
