@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,6 +22,7 @@ _METRES_PER_UNIT = 0.01
 _UNITS_PER_MM = 0.1
 _ROOT = "/head"
 _TEXTURE = "atlas.jpg"
+_DATE = 946728000  # noon of 2000-01-01, in seconds since 1970
 
 
 def save_usdz(
@@ -49,6 +51,9 @@ def save_usdz(
         stage = Usd.Stage.CreateNew(str(layer))
         _fill_stage(stage, surface, head)
         stage.Save()
+        for member in Path(folder).iterdir():
+            # The package keeps each member's date; the same head shall give the same bytes.
+            os.utime(member, (_DATE, _DATE))
         if not UsdUtils.CreateNewUsdzPackage(str(layer), str(package)):
             raise InputError(path, "usd-core to write the package", "a failure without a reason")
         temporary.write_bytes(package.read_bytes())
@@ -153,20 +158,21 @@ def _define_blend_shapes(stage: Any, mesh: Any, targets: tuple[MorphTarget, ...]
     binding.CreateJointIndicesPrimvar(True, 1).Set(Vt.IntArray(1))
     binding.CreateJointWeightsPrimvar(True, 1).Set(Vt.FloatArray([1.0]))
     binding.CreateBlendShapesAttr(names)
-    for number, target in enumerate(targets):
-        _define_blend_shape(stage, mesh, binding, number, target)
+    shapes = [_define_blend_shape(stage, mesh, target) for target in targets]
+    binding.CreateBlendShapeTargetsRel().SetTargets(shapes)
 
 
-def _define_blend_shape(
-    stage: Any, mesh: Any, binding: Any, number: int, target: MorphTarget
-) -> None:
+def _define_blend_shape(stage: Any, mesh: Any, target: MorphTarget) -> Any:
+    """Its path, which has the target's name as nearly as USD allows."""
     from pxr import Tf, UsdSkel
 
-    path = mesh.GetPath().AppendChild(Tf.MakeValidIdentifier(target.name))
-    shape = UsdSkel.BlendShape.Define(stage, path)
+    name = Tf.MakeValidIdentifier(target.name)
+    while stage.GetPrimAtPath(mesh.GetPath().AppendChild(name)):
+        name += "_"
+    shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(name))
     shape.CreateOffsetsAttr(_points(target.offsets))
     shape.CreatePointIndicesAttr(_integers(target.vertices))
-    binding.CreateBlendShapeTargetsRel().AddTarget(path)
+    return shape.GetPath()
 
 
 def _points(millimetres: Float[Array, "n 3"]) -> Any:

@@ -1,0 +1,106 @@
+"""Video files from rendered frames: H.264 in .mp4, VP9 in .webm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mien.arrays import Array, UInt8, check_image, check_positive
+from mien.errors import InputError
+from mien.formats.atomic import atomic_file
+
+# By container: the encoders that will do, the best first (a build of FFmpeg may lack libx264 for
+# its licence), and what the container itself is told. With its index moved to the front an .mp4
+# starts to play before all of it has arrived.
+_ENCODERS = {".mp4": ("libx264", "libopenh264"), ".webm": ("libvpx-vp9",)}
+_CONTAINER_OPTIONS = {".mp4": {"movflags": "+faststart"}, ".webm": {}}
+
+# FFmpeg's numbers: BT.709 for matrix, primaries and transfer; 16 to 235 for luma. Players take a
+# file that does not say for one or the other by its size, and shift its colours.
+_BT709, _LIMITED_RANGE = 1, 1
+
+
+def write_video(
+    path: str | Path,
+    frames: Iterable[UInt8[Array, "h w 3"]],
+    fps: float,
+    *,
+    quality: int = 18,
+) -> int:
+    """Write frames as a video that browsers and players open, whole or not at all.
+
+    Args:
+        path: .mp4 (H.264) or .webm (VP9).
+        frames: (h, w, 3) sRGB, all of one size, taken one at a time. An odd side is made even by
+            repeating its last row or column: colour at half resolution wants pairs.
+        fps: frames a second.
+        quality: the encoder's constant rate factor; lower is better and larger, 18 looks exact.
+    Returns: how many frames were written.
+    Raises: InputError: another suffix, no frame, a frame of another size, no encoder in this build
+        of FFmpeg, a place that cannot be written.
+    """
+    import av
+
+    suffix = Path(path).suffix.lower()
+    if suffix not in _ENCODERS:
+        raise InputError(path, f"a name that ends in {' or '.join(_ENCODERS)}", suffix or "none")
+    rate = Fraction(check_positive("fps", fps)).limit_denominator(1001)
+    encoder = _find_encoder(path, _ENCODERS[suffix])
+    remaining = iter(frames)
+    first = next(remaining, None)
+    if first is None:
+        raise InputError(path, "at least one frame to write", "none")
+    height, width = check_image("frame 0", first).shape[:2]
+    options = _CONTAINER_OPTIONS[suffix]
+    with (
+        atomic_file(path) as temporary,
+        av.open(temporary, "w", format=suffix[1:], container_options=options) as container,
+    ):
+        stream: Any = container.add_stream(encoder, rate, {"crf": str(quality), "b": "0"})
+        stream.width, stream.height = width + width % 2, height + height % 2
+        _declare_color(stream)
+        count = 0
+        for frame in chain([first], remaining):
+            _check_size(frame, count, (height, width))
+            container.mux(stream.encode(_to_yuv(frame)))
+            count += 1
+        container.mux(stream.encode(None))
+    return count
+
+
+def _find_encoder(path: str | Path, names: tuple[str, ...]) -> str:
+    import av
+
+    for name in names:
+        if name in av.codecs_available:
+            return name
+    raise InputError(path, f"PyAV with the encoder {' or '.join(names)}", "a build without")
+
+
+def _declare_color(stream: Any) -> None:
+    context = stream.codec_context
+    context.pix_fmt = "yuv420p"
+    context.colorspace = context.color_primaries = context.color_trc = _BT709
+    context.color_range = _LIMITED_RANGE
+
+
+def _check_size(frame: object, index: int, size: tuple[int, int]) -> None:
+    found = check_image(f"frame {index}", frame).shape[:2]
+    if found != size:
+        height, width = size
+        raise InputError(
+            f"frame {index}", f"{width}x{height} px as the first", f"{found[1]}x{found[0]} px"
+        )
+
+
+def _to_yuv(frame: UInt8[Array, "h w 3"]) -> Any:
+    import av
+
+    height, width = frame.shape[:2]
+    even = np.pad(frame, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    return av.VideoFrame.from_ndarray(even).reformat(format="yuv420p", dst_colorspace=_BT709)
