@@ -14,7 +14,7 @@ MAX_YAW = np.radians(50)
 
 # Gaze follows the head and moves nothing that matters; "_neutral" is constant.
 _SHAPED = np.array([name[0] != "_" and not name.startswith("eyeLook") for name in BLENDSHAPE_NAMES])
-_COMMON_SHARE = 0.2
+_COMMON_SHARE = 0.1
 _SAME_EXPRESSION = 0.6
 _SHARP_SHARE = 0.5
 _SAME_POSE = np.radians(3)
@@ -64,9 +64,7 @@ def _usable(scores: FrameScores) -> Int[Array, " m"]:
     """Rows within reach of the detector, alike in expression, and sharp for their kind."""
     frontal = np.abs(scores.pose[:, 0]) <= MAX_YAW
     rows = np.flatnonzero(frontal if frontal.any() else np.ones_like(frontal))
-    away = expression_distance(scores.blendshapes[rows])
-    reach = max(_SAME_EXPRESSION, float(np.quantile(away, _COMMON_SHARE)))
-    rows = rows[away <= reach]
+    rows = rows[expression_distance(scores.blendshapes[rows]) <= _SAME_EXPRESSION]
     sharpness = scores.sharpness[rows]
     sharp: Array = rows[sharpness >= _SHARP_SHARE * np.median(sharpness)]
     return sharp
@@ -75,7 +73,7 @@ def _usable(scores: FrameScores) -> Int[Array, " m"]:
 def expression_distance(blendshapes: Float[Array, "n 52"]) -> Float[Array, " n"]:
     """How far each frame's expression is from the commonest: 0.2 is alike, 1.5 a broad smile.
 
-    The commonest is the frame with the nearest fifth of the clip closest around it.
+    The commonest is the frame with the nearest tenth of the clip closest around it.
     """
     shaped = blendshapes[:, _SHAPED]
     apart = np.linalg.norm(shaped[:, None] - shaped[None], axis=2)
