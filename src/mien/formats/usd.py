@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import os
+import io
+import struct
+import zipfile
 from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,7 +24,7 @@ _METRES_PER_UNIT = 0.01
 _UNITS_PER_MM = 0.1
 _ROOT = "/head"
 _TEXTURE = "atlas.jpg"
-_DATE = 946728000  # noon of 2000-01-01, in seconds since 1970
+_PADDING_FIELD = 0x1986  # the extra field's kind that USD itself uses
 
 
 def save_usdz(
@@ -40,23 +42,37 @@ def save_usdz(
     Raises: InputError: usd-core is not installed; an unknown part, a place that cannot be written.
     """
     try:
-        from pxr import Usd, UsdUtils
+        from pxr import Usd
     except ImportError:
         raise InputError(path, "usd-core (pip install 'mien[usd]')", "no such package") from None
     surface = export_surface(head, parts=parts, units=units)
-    with TemporaryDirectory(prefix="mien-usd-") as folder, atomic_file(path) as temporary:
-        layer, package = Path(folder, "head.usdc"), Path(folder, "head.usdz")
-        if surface.texture is not None:
-            Path(folder, _TEXTURE).write_bytes(encode_image(surface.texture, "JPEG"))
+    with TemporaryDirectory(prefix="mien-usd-") as folder:
+        layer = Path(folder, "head.usdc")
         stage = Usd.Stage.CreateNew(str(layer))
         _fill_stage(stage, surface, head)
         stage.Save()
-        for member in Path(folder).iterdir():
-            # The package keeps each member's date; the same head shall give the same bytes.
-            os.utime(member, (_DATE, _DATE))
-        if not UsdUtils.CreateNewUsdzPackage(str(layer), str(package)):
-            raise InputError(path, "usd-core to write the package", "a failure without a reason")
-        temporary.write_bytes(package.read_bytes())
+        members = {layer.name: layer.read_bytes()}
+    if surface.texture is not None:
+        members[_TEXTURE] = encode_image(surface.texture, "JPEG")
+    data = _package(members)
+    with atomic_file(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def _package(members: dict[str, bytes]) -> bytes:
+    """A .usdz: a zip archive whose members are stored as they are, from multiples of 64 bytes on.
+
+    USD's own writer puts in the time of day; the same head shall give the same bytes.
+    """
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
+        for name, data in members.items():
+            # 30 bytes of header, the name, and an extra field with 4 bytes of its own.
+            padding = -(stream.tell() + 30 + len(name) + 4) % 64
+            info = zipfile.ZipInfo(name)
+            info.extra = struct.pack("<HH", _PADDING_FIELD, padding) + bytes(padding)
+            archive.writestr(info, data)
+    return stream.getvalue()
 
 
 def _fill_stage(stage: Any, surface: ExportSurface, head: Head) -> None:
