@@ -1,0 +1,109 @@
+"""From photos to a head: the whole way, as one function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from mien.assets.generic import GenericHead, load_generic_head
+from mien.capture.source import NEUTRAL, Capture, View, load_capture
+from mien.errors import EstimationError
+from mien.model.fit import Fit, FitOptions, fit_views
+from mien.model.head import ATLAS, CYLINDER, Expression, FittedView, Head
+
+Progress = Callable[[str, int, int], None]
+"""Told the stage, the steps done and their total."""
+
+
+@dataclass(frozen=True)
+class BuildOptions:
+    """How a head is built.
+
+    Attributes:
+        fit: how cameras and shape are found.
+        fill: "pyramid" or "grow": how texture that no photo shows is filled.
+        texture_size: side of the atlas in px; the cylinder is always 2048x1024.
+        face: which face where a photo shows several.
+        frames: how many frames to pick from a video.
+    """
+
+    fit: FitOptions = field(default_factory=FitOptions)
+    fill: str = "pyramid"
+    texture_size: int = 2048
+    face: int | None = None
+    frames: int = 7
+
+
+@dataclass(frozen=True)
+class Build:
+    """A head and how it came about, for those who want to look closer."""
+
+    head: Head
+    capture: Capture
+    fits: dict[str, Fit]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know, in the order in which it was noticed."""
+        fitted = [note for fit in self.fits.values() for note in fit.notes]
+        left_out = [f"{photo} was left out: {why}" for photo, why in self.head.left_out.items()]
+        return (*self.capture.notes, *left_out, *fitted)
+
+
+def build(
+    source: str | Path,
+    *,
+    options: BuildOptions | None = None,
+    progress: Progress | None = None,
+) -> Build:
+    """A textured head from a folder of photos, one photo, or a video.
+
+    Raises: InputError, FileFormatError: the source. EstimationError: no photo fits.
+    """
+    options = options or BuildOptions()
+    tell = progress or (lambda stage, done, total: None)
+    generic = load_generic_head()
+    capture = load_capture(
+        source,
+        face=options.face,
+        progress=lambda done, total: tell("Finding faces", done, total),
+    )
+    if NEUTRAL not in capture.expressions:
+        raise EstimationError(f"{source}: there is no folder called {NEUTRAL} among its folders")
+    fits: dict[str, Fit] = {}
+    for done, (name, views) in enumerate(capture.expressions.items()):
+        tell("Solving cameras and shape", done, len(capture.expressions))
+        fits[name] = fit_views(views, generic, options.fit)
+    tell("Solving cameras and shape", len(fits), len(fits))
+    head = _head(capture, fits, generic)
+    return Build(_textured(head, capture, options, tell), capture, fits)
+
+
+def _head(capture: Capture, fits: dict[str, Fit], generic: GenericHead) -> Head:
+    neutral = fits[NEUTRAL]
+    return Head(
+        subject=capture.name,
+        mesh=generic.mesh.with_vertices(neutral.vertices),
+        expressions={name: _expression(name, fit) for name, fit in fits.items()},
+        uncertainty_mm=neutral.uncertainty_mm,
+        unit_names=generic.unit_names,
+        unit_offsets=generic.unit_offsets,
+        left_out={photo: why for fit in fits.values() for photo, why in fit.left_out.items()},
+    )
+
+
+def _expression(name: str, fit: Fit) -> Expression:
+    views = tuple(
+        FittedView(
+            photo=photo,
+            camera=item.camera,
+            rms_px=item.rms_px,
+            points_used=len(item.trusted),
+            distrusted={mark.name: mark.verdict for mark in item.marks if mark.verdict},
+        )
+        for photo, item in fit.photos.items()
+    )
+    return Expression(fit.vertices, views, ATLAS if name == NEUTRAL else name)

@@ -1,0 +1,213 @@
+"""Feature points: places on the head's surface and where the photos show them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mien.arrays import Array, Bool, Float, Int
+from mien.assets.generic import GenericHead
+from mien.camera import Camera
+from mien.capture.source import View
+from mien.errors import InputError
+from mien.model.curves import match_curve, resample_curve
+
+POINT_SIGMA_MM = 0.5
+"""How well a person places a named point (about 1 px where a face fills a 2-megapixel photo)."""
+CURVE_SIGMA_MM = 1.0
+"""How well a drawn curve tells a point's place along it."""
+LANDMARK_SIGMA_MM = 2.5
+"""How far a detector's point slides over the skin between views (docs/pose-recovery.md)."""
+MIN_CONFIDENCE = 0.1
+"""Landmarks below are not used: the surface turns away there."""
+WINS_WITHIN_MM = 15.0
+"""A hand-made mark silences the same photo's detector this far around it."""
+
+
+@dataclass(frozen=True)
+class Features:
+    """N places on the mesh, seen in K photos.
+
+    Attributes:
+        names: (N) point, POLYLINE.INDEX, or landmark number.
+        corners: (N, 3) vertices of the triangle that holds the place; barycentrics: (N, 3) in it.
+        image_points: (K, N, 2) px, NaN where unseen.
+        sigma_mm: (K, N) standard deviation of the observation on the surface; inf where unseen.
+        by_hand: (K, N) True for a mark that a person made.
+    """
+
+    names: tuple[str, ...]
+    corners: Int[Array, "n 3"]
+    barycentrics: Float[Array, "n 3"]
+    image_points: Float[Array, "k n 2"]
+    sigma_mm: Float[Array, "k n"]
+    by_hand: Bool[Array, "k n"]
+
+    @property
+    def seen(self) -> Bool[Array, "k n"]:
+        """(K, N) where a photo shows a feature."""
+        return np.isfinite(self.sigma_mm)
+
+    def on(self, vertices: Float[Array, "... v 3"]) -> Float[Array, "... n 3"]:
+        """Where the features lie on a head (or on each of a stack of offset fields), mm."""
+        places: Array = np.einsum(
+            "nc,...ncd->...nd", self.barycentrics, vertices[..., self.corners, :]
+        )
+        return places
+
+    def of_photos(self, keep: Bool[Array, " k"]) -> Features:
+        """Only these photos; features that none of them shows are dropped."""
+        image, sigma = self.image_points[keep], self.sigma_mm[keep]
+        used = np.isfinite(sigma).any(axis=0)
+        return Features(
+            names=tuple(name for name, use in zip(self.names, used, strict=True) if use),
+            corners=self.corners[used],
+            barycentrics=self.barycentrics[used],
+            image_points=image[:, used],
+            sigma_mm=sigma[:, used],
+            by_hand=self.by_hand[keep][:, used],
+        )
+
+
+def gather_features(views: Sequence[View], generic: GenericHead) -> Features:
+    """Hand-made marks and curves of all photos, and landmarks where those are silent.
+
+    Drawn curves become points by arc length; `rematch_curves` improves on that once cameras are
+    known. A point marked by name wins over the curve through it.
+    """
+    columns = _columns(generic)
+    landmarks = np.flatnonzero(generic.landmark_attached & _steady_landmarks())
+    vertices = list(columns)
+    image = np.full((len(views), len(vertices) + len(landmarks), 2), np.nan)
+    sigma = np.full(image.shape[:2], np.inf)
+    for k, view in enumerate(views):
+        for vertex, point in _curve_points(view, generic).items():
+            image[k, columns[vertex]], sigma[k, columns[vertex]] = point, CURVE_SIGMA_MM
+        for name, point in (view.annotations.points if view.annotations else {}).items():
+            column = columns[generic.vertex_of(name)]
+            image[k, column], sigma[k, column] = point, POINT_SIGMA_MM
+        if view.landmarks is not None:
+            confidence = view.landmarks.confidence[landmarks]
+            image[k, len(vertices) :] = view.landmarks.points[landmarks]
+            sigma[k, len(vertices) :] = np.where(
+                confidence > MIN_CONFIDENCE,
+                LANDMARK_SIGMA_MM / np.maximum(confidence, MIN_CONFIDENCE),
+                np.inf,
+            )
+    first_corner = np.tile([1.0, 0.0, 0.0], (len(vertices), 1))
+    features = Features(
+        names=(*_names(generic, vertices), *(f"landmark {number}" for number in landmarks)),
+        corners=np.concatenate(
+            [
+                np.repeat(np.array(vertices)[:, None], 3, axis=1),
+                generic.mesh.triangles[generic.landmark_triangles[landmarks]],
+            ]
+        ),
+        barycentrics=np.concatenate([first_corner, generic.landmark_barycentrics[landmarks]]),
+        image_points=image,
+        sigma_mm=sigma,
+        by_hand=np.isfinite(sigma) & (np.arange(image.shape[1]) < len(vertices)),
+    )
+    return _silence_landmarks(features, generic).of_photos(np.ones(len(views), bool))
+
+
+def rematch_curves(
+    features: Features, views: Sequence[View], cameras: Sequence[Camera], generic: GenericHead
+) -> Features:
+    """Points of the drawn curves moved along them to where the epipolar lines say (P02 5.1.3).
+
+    For each curve the photo whose points were marked most squarely, the one that shows it longest
+    in pixels, serves as the reference; the others follow it.
+    """
+    image = features.image_points.copy()
+    columns = {int(a): n for n, (a, b, _) in enumerate(features.corners) if a == b}
+    for name, vertices in generic.polylines.items():
+        drawn = {
+            k: view.annotations.curves[name]
+            for k, view in enumerate(views)
+            if view.annotations and name in view.annotations.curves
+        }
+        if len(drawn) < 2:
+            continue
+        reference = max(drawn, key=lambda k: _length(drawn[k]) / cameras[k].focal_px)
+        places = _fractions(generic, name)
+        points = resample_curve(drawn[reference], places)
+        for k, curve in drawn.items():
+            if k == reference:
+                continue
+            matched = match_curve(points, cameras[reference], curve, cameras[k], fractions=places)
+            for vertex, point in zip(vertices, matched.points, strict=True):
+                column = columns[vertex]
+                if features.sigma_mm[k, column] == CURVE_SIGMA_MM:
+                    image[k, column] = point
+    return replace(features, image_points=image)
+
+
+def _columns(generic: GenericHead) -> dict[int, int]:
+    """A column for every vertex that has a name; an eye's corner, say, has several."""
+    vertices = dict.fromkeys(generic.vertex_of(name) for name in generic.feature_names)
+    return {vertex: column for column, vertex in enumerate(vertices)}
+
+
+def _names(generic: GenericHead, vertices: list[int]) -> list[str]:
+    named: dict[int, str] = {}
+    for name in generic.feature_names:
+        named.setdefault(generic.vertex_of(name), name)
+    return [named[vertex] for vertex in vertices]
+
+
+def _curve_points(view: View, generic: GenericHead) -> dict[int, Float[Array, " 2"]]:
+    """Every drawn curve's points by arc length, by vertex of its polyline."""
+    points: dict[int, Float[Array, " 2"]] = {}
+    for name, curve in (view.annotations.curves if view.annotations else {}).items():
+        try:
+            along = resample_curve(curve, _fractions(generic, name))
+        except InputError as error:
+            raise InputError(
+                f"{view.photo.name}: curves.{name}", error.expected, error.got
+            ) from None
+        points.update(zip(generic.polylines[name], along, strict=True))
+    return points
+
+
+def _fractions(generic: GenericHead, name: str) -> Float[Array, " n"]:
+    """Arc-length positions in [0, 1] of a polyline's vertices on the generic head."""
+    line = generic.mesh.vertices[list(generic.polylines[name])]
+    lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+    fractions: Array = lengths / lengths[-1]
+    return fractions
+
+
+def _length(curve: Float[Array, "m 2"]) -> float:
+    return float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum())
+
+
+def _silence_landmarks(features: Features, generic: GenericHead) -> Features:
+    places = features.on(generic.mesh.vertices)
+    landmark = np.char.startswith(features.names, "landmark")
+    sigma = features.sigma_mm.copy()
+    for k, hand in enumerate(features.by_hand):
+        if hand.any():
+            distance = cKDTree(places[hand]).query(places)[0]
+            sigma[k, landmark & (distance < WINS_WITHIN_MM)] = np.inf
+    image = np.where(np.isfinite(sigma)[..., None], features.image_points, np.nan)
+    return replace(features, image_points=image, sigma_mm=sigma)
+
+
+def _steady_landmarks() -> Bool[Array, " 478"]:
+    """All but the face oval: its points run along the silhouette, wherever that is."""
+    steady = np.ones(478, bool)
+    steady[list(_FACE_OVAL)] = False
+    return steady
+
+
+# The detector's own list of the points around the face, from the forehead clockwise in the image.
+# fmt: off
+_FACE_OVAL = (
+    10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377,
+    152, 148, 176, 149, 150, 136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109,
+)
+# fmt: on

@@ -1,0 +1,330 @@
+"""Photos of one expression to cameras and a shape: the whole of P02 sec. 5.1."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.assets.generic import GenericHead
+from mien.camera import Camera
+from mien.capture.source import View
+from mien.model.adjust import FocalPrior, ShapePrior, adjust_bundle
+from mien.model.deform import deform_head, eye_centers, vertex_uncertainty
+from mien.model.features import Features, gather_features, rematch_curves
+from mien.model.pose import recover_pose
+from mien.model.rays import intersect_rays
+
+FOCAL_PRIOR_DIAGONALS = 1.7
+"""Without EXIF: a focal length between a phone's (0.6 diagonals) and a cropped portrait's (3.5)."""
+FOCAL_PRIOR_DEVIATION = 0.6
+EXIF_DEVIATION = 0.05
+RESIDUAL_SIGMA_MM = 1.5
+"""How far a face departs from the identity basis, each axis (docs/generic-head.md)."""
+PRIOR_DEVIATION_MM = 2.5
+"""How far the generic head lies from a person's where no photo tells."""
+DISTRUST_SIGMAS = 5.0
+MISFIT_SIGMAS, MISFIT_RATIO = 4.0, 3.0
+MIN_PARALLAX_DEG = 8.0
+
+
+@dataclass(frozen=True)
+class Mark:
+    """One feature in one photo: where it was seen and how far off the model puts it, px."""
+
+    name: str
+    image_point: Float[Array, " 2"]
+    residual_px: Float[Array, " 2"]
+    by_hand: bool
+    verdict: str = ""
+
+    @property
+    def distance_px(self) -> float:
+        """Length of the residual."""
+        return float(np.hypot(*self.residual_px))
+
+
+@dataclass(frozen=True)
+class PhotoFit:
+    """The camera of one photo and how well its marks agree with the fitted head."""
+
+    camera: Camera
+    marks: tuple[Mark, ...]
+
+    @property
+    def trusted(self) -> tuple[Mark, ...]:
+        """The marks without a verdict."""
+        return tuple(mark for mark in self.marks if not mark.verdict)
+
+    @property
+    def rms_px(self) -> float:
+        """Root mean square distance over the trusted marks."""
+        squares = [mark.distance_px**2 for mark in self.trusted]
+        return float(np.sqrt(np.mean(squares))) if squares else 0.0
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted shape.
+
+    Attributes:
+        vertices: (V, 3) mm, head space.
+        photos: by photo name, those that fit.
+        left_out: why, by photo name, the others did not.
+        uncertainty_mm: (V,).
+        notes: what a user should know about this fit.
+    """
+
+    vertices: Float[Array, "v 3"]
+    photos: dict[str, PhotoFit]
+    left_out: dict[str, str]
+    uncertainty_mm: Float[Array, " v"]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How a fit is done; the defaults are what works best.
+
+    Attributes:
+        adjust: joint bundle adjustment under the identity prior after P02's five steps; without it,
+            cameras come from the five steps and shape from ray intersection alone, as in P02.
+        curves: "epipolar" or "arc-length", how drawn curves become points (P02 sec. 5.1.3).
+        kernel: radial basis of the deformation (numeric.rbf).
+        interpupillary_mm: measured distance between the pupils, which sets the scale.
+        one_camera: all photos come from one lens at one zoom, as a video's frames do.
+        rounds: times that curves and shape are refined.
+    """
+
+    adjust: bool = True
+    curves: str = "epipolar"
+    kernel: str = "exponential"
+    interpupillary_mm: float = 63.0
+    one_camera: bool = False
+    rounds: int = 2
+
+
+def fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions) -> Fit:
+    """Cameras and shape of one expression.
+
+    Raises: EstimationError: no photo fits.
+    Source: P02 sec. 5.1.
+    """
+    features = gather_features(views, generic)
+    left_out: dict[str, str] = {}
+    while True:
+        solution = _solve(views, features, generic, options)
+        left_out |= solution.problems
+        misfit = _misfit(solution)
+        if misfit is None:
+            break
+        left_out |= misfit
+        views = [view for view in solution.views if view.photo.name not in misfit]
+        features = gather_features(views, generic)
+    vertices, cameras = _in_head_space(solution, generic, options)
+    photos = {
+        view.photo.name: PhotoFit(camera, _marks(solution, k))
+        for k, (view, camera) in enumerate(zip(solution.views, cameras, strict=True))
+    }
+    return Fit(
+        vertices=vertices,
+        photos=photos,
+        left_out=left_out,
+        uncertainty_mm=vertex_uncertainty(
+            solution.vertices,
+            solution.features.on(solution.vertices),
+            solution.deviation_mm,
+            prior_mm=PRIOR_DEVIATION_MM,
+        ),
+        notes=_notes(cameras),
+    )
+
+
+@dataclass(frozen=True)
+class _Solution:
+    """Cameras and shape in the frame and scale of the solver."""
+
+    views: Sequence[View]
+    features: Features
+    cameras: tuple[Camera, ...]
+    vertices: Float[Array, "v 3"]
+    residuals: Float[Array, "k n 2"]
+    sigma_px: Float[Array, "k n"]
+    deviation_mm: Float[Array, " n"]
+    problems: dict[str, str]
+
+
+def _solve(
+    views: Sequence[View], features: Features, generic: GenericHead, options: FitOptions
+) -> _Solution:
+    """P02's five steps, then as often as asked for: curves, joint adjustment or rays, shape."""
+    start = recover_pose(
+        features.image_points,
+        features.on(generic.mesh.vertices),
+        np.array([view.photo.size for view in views]),
+        weights=1 / features.sigma_mm**2,
+    )
+    problems = {
+        view.photo.name: text for view, text in zip(views, start.problems, strict=True) if text
+    }
+    keep = np.array([not text for text in start.problems])
+    views = [view for view in views if view.photo.name not in problems]
+    features = features.of_photos(keep)
+    cameras = tuple(camera for camera in start.cameras if camera is not None)
+    vertices = generic.mesh.vertices
+    for _ in range(options.rounds):
+        if options.curves == "epipolar":
+            features = rematch_curves(features, views, cameras, generic)
+        sigma_px = features.sigma_mm * _px_per_mm(cameras)[:, None]
+        if options.adjust:
+            cameras, vertices, deviation = _adjust(
+                views, features, cameras, vertices, sigma_px, generic, options
+            )
+        else:
+            vertices, deviation = _intersect(features, cameras, vertices, generic, options)
+    projected = np.stack([camera.project(features.on(vertices)) for camera in cameras])
+    return _Solution(
+        views,
+        features,
+        cameras,
+        vertices,
+        projected - features.image_points,
+        sigma_px,
+        deviation,
+        problems,
+    )
+
+
+def _adjust(
+    solution_views: Sequence[View],
+    features: Features,
+    cameras: tuple[Camera, ...],
+    vertices: Float[Array, "v 3"],
+    sigma_px: Float[Array, "k n"],
+    generic: GenericHead,
+    options: FitOptions,
+) -> tuple[tuple[Camera, ...], Float[Array, "v 3"], Float[Array, " n"]]:
+    """Cameras, shape and the features' deviations of highest posterior."""
+    prior = ShapePrior(
+        mean=features.on(generic.mesh.vertices),
+        components=features.on(generic.identity.components),
+        sigma=np.full(len(features.names), RESIDUAL_SIGMA_MM),
+    )
+    adjustment = adjust_bundle(
+        cameras,
+        features.on(vertices),
+        features.image_points,
+        sigma_px=np.where(features.seen, sigma_px, 1.0),
+        loss="cauchy",
+        shape_prior=prior,
+        focal_prior=_focal_prior(solution_views),
+        focal_group=np.zeros(len(cameras), int) if options.one_camera else None,
+    )
+    person = generic.mesh.vertices + generic.identity.offsets(adjustment.coefficients)
+    shape = deform_head(
+        person,
+        features.on(person),
+        adjustment.points,
+        generic,
+        deviation_mm=adjustment.point_sd_mm,
+        kernel=options.kernel,
+    )
+    return adjustment.cameras, shape, adjustment.point_sd_mm
+
+
+def _intersect(
+    features: Features,
+    cameras: tuple[Camera, ...],
+    vertices: Float[Array, "v 3"],
+    generic: GenericHead,
+    options: FitOptions,
+) -> tuple[Float[Array, "v 3"], Float[Array, " n"]]:
+    """P02 sec. 5.1.3: cameras fixed, features where their rays meet, the rest follows."""
+    places = features.on(vertices)
+    weights = 1 / features.sigma_mm**2
+    rays = intersect_rays(cameras, features.image_points, weights=weights, current=places)
+    shape = deform_head(vertices, places, rays.points, generic, kernel=options.kernel)
+    return shape, np.where(rays.solved, rays.residual_mm, PRIOR_DEVIATION_MM)
+
+
+def _px_per_mm(cameras: Sequence[Camera]) -> Float[Array, " k"]:
+    """(K,) how many px a millimetre at the head's distance covers."""
+    return np.array([camera.focal_px / camera.t_cam_head[2] for camera in cameras])
+
+
+def _focal_prior(views: Sequence[View]) -> FocalPrior:
+    """EXIF where the photo has it; otherwise anything from a phone to a cropped portrait."""
+    known = [view.photo.focal_prior_px for view in views]
+    diagonals = [float(np.hypot(*view.photo.size)) for view in views]
+    focal = [
+        FOCAL_PRIOR_DIAGONALS * diagonal if exif is None else exif
+        for exif, diagonal in zip(known, diagonals, strict=True)
+    ]
+    deviation = [FOCAL_PRIOR_DEVIATION if exif is None else EXIF_DEVIATION for exif in known]
+    return FocalPrior(np.array(focal), np.array(deviation))
+
+
+def _misfit(solution: _Solution) -> dict[str, str] | None:
+    """The photo that fits worst, and why, if it fits so badly that it shows something else."""
+    if len(solution.cameras) < 2:
+        return None
+    off = np.linalg.norm(solution.residuals, axis=2) / solution.sigma_px
+    typical = np.array([np.sqrt(np.median(row[np.isfinite(row)] ** 2)) for row in off])
+    worst = int(typical.argmax())
+    others = float(np.median(np.delete(typical, worst)))
+    if typical[worst] < max(MISFIT_SIGMAS, MISFIT_RATIO * others):
+        return None
+    reason = (
+        f"its marks lie {typical[worst]:.1f} times their expected error off the head that the "
+        f"other photos show ({others:.1f} times there)"
+    )
+    return {solution.views[worst].photo.name: reason}
+
+
+def _in_head_space(
+    solution: _Solution, generic: GenericHead, options: FitOptions
+) -> tuple[Float[Array, "v 3"], tuple[Camera, ...]]:
+    """The same picture with the origin between the eyes and the measured scale."""
+    eyes = eye_centers(solution.vertices, generic)
+    origin = eyes.mean(axis=0)
+    scale = options.interpupillary_mm / float(np.linalg.norm(eyes[0] - eyes[1]))
+    cameras = tuple(
+        replace(camera, t_cam_head=scale * (camera.t_cam_head + camera.R_cam_head @ origin))
+        for camera in solution.cameras
+    )
+    return scale * (solution.vertices - origin), cameras
+
+
+def _marks(solution: _Solution, k: int) -> tuple[Mark, ...]:
+    """Every mark of photo k with its residual; far off its expected error it is distrusted."""
+    features = solution.features
+    marks = []
+    for n in np.flatnonzero(features.seen[k]):
+        residual = solution.residuals[k, n]
+        off = float(np.hypot(*residual)) / solution.sigma_px[k, n]
+        verdict = f"{off:.0f} times its expected error off" if off > DISTRUST_SIGMAS else ""
+        marks.append(
+            Mark(
+                features.names[n],
+                features.image_points[k, n],
+                residual,
+                bool(features.by_hand[k, n]),
+                verdict,
+            )
+        )
+    return tuple(marks)
+
+
+def _notes(cameras: Sequence[Camera]) -> tuple[str, ...]:
+    if len(cameras) == 1:
+        return ("one photo: depth comes from the prior of faces, not from this person",)
+    axes = np.stack([camera.center / np.linalg.norm(camera.center) for camera in cameras])
+    spread = float(np.degrees(np.arccos(np.clip(axes @ axes.T, -1, 1)).max()))
+    if spread < MIN_PARALLAX_DEG:
+        return (
+            f"all photos come from within {spread:.0f} degrees: depth comes from the prior of "
+            f"faces, not from this person ({MIN_PARALLAX_DEG:.0f} degrees or more would show it)",
+        )
+    return ()
