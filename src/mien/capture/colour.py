@@ -60,7 +60,7 @@ def to_srgb(image: Image, profile: bytes | None, notes: list[str]) -> Image:
                 assert converted is not None
                 notes.append(f"colours converted from {name or 'an unnamed profile'} to sRGB")
                 return converted
-        except ImageCms.PyCMSError:
+        except (ImageCms.PyCMSError, OSError):
             notes.append("its colour profile is damaged or of another kind: taken as sRGB")
     elif image.mode == "CMYK":
         notes.append("CMYK without a colour profile: colours are approximate")

@@ -174,8 +174,10 @@ def _shrunk_rgb(image: Image, max_side: int, notes: list[str]) -> Image:
     target = max(1, round(image.width * factor)), max(1, round(image.height * factor))
     if factor < 1:
         image.draft(None, target)
-    if getattr(image, "n_frames", 1) > 1:
+    # A phone's MPO holds its preview or gain map beside the photo: no news.
+    if getattr(image, "n_frames", 1) > 1 and image.format != "MPO":
         notes.append(f"holds {getattr(image, 'n_frames', 1)} pictures: the first is used")
+    image.load()
     profile = image.info.get("icc_profile")
     eight_bits = to_eight_bits(image, notes)
     if eight_bits.size != target and factor < 1:

@@ -1,0 +1,127 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mien.arrays import Array, check_rotation
+from mien.capture.detector import LandmarkDetector
+from mien.capture.landmarks import Landmarks
+from mien.capture.mediapipe_face import yaw_pitch
+from mien.capture.photos import Photo
+from mien.errors import EstimationError, InputError
+
+AsPhoto = Callable[..., Photo]
+
+RIGHT_CHEEK, LEFT_CHEEK = 234, 454
+NOSE_TIP, CHIN, FOREHEAD = 1, 152, 10
+
+
+def resized(pixels: Array, width: int) -> Array:
+    height = round(pixels.shape[0] * width / pixels.shape[1])
+    return np.asarray(Image.fromarray(pixels).resize((width, height), Image.Resampling.LANCZOS))
+
+
+def shift(found: Landmarks, truth: Array) -> float:
+    """Median distance in distances between the eyes."""
+    return float(np.median(np.linalg.norm(found.points - truth, axis=1)) / found.eye_distance_px)
+
+
+def test_left_and_right_are_the_subjects(
+    detector: LandmarkDetector, faces: dict[str, Array], as_photo: AsPhoto
+) -> None:
+    left = detector.detect(as_photo(faces["left"]))
+    right = detector.detect(as_photo(faces["right"]))
+    # One photo shows more of his right cheek, as his head is turned to his left, and vice versa.
+    assert np.degrees(yaw_pitch(left.R_cam_head)[0]) == pytest.approx(24, abs=8)
+    assert np.degrees(yaw_pitch(right.R_cam_head)[0]) == pytest.approx(-24, abs=10)
+    for landmarks in (left, right):
+        assert landmarks.points[RIGHT_CHEEK, 0] < landmarks.points[LEFT_CHEEK, 0]
+        assert landmarks.points[FOREHEAD, 1] < landmarks.points[CHIN, 1]
+        assert landmarks.confidence[NOSE_TIP] > 0.5
+        check_rotation("R", landmarks.R_cam_head)
+        assert not landmarks.notes
+    assert left.confidence[RIGHT_CHEEK] > 0.3
+    assert left.confidence[LEFT_CHEEK] == 0
+    assert right.confidence[LEFT_CHEEK] > 0.3
+    assert right.confidence[RIGHT_CHEEK] == 0
+
+
+def test_scale_of_the_photo_does_not_matter(
+    detector: LandmarkDetector, faces: dict[str, Array], as_photo: AsPhoto
+) -> None:
+    full = detector.detect(as_photo(faces["left"]))
+    half = detector.detect(as_photo(resized(faces["left"], 300)))
+    double = detector.detect(as_photo(resized(faces["left"], 1800)))
+    assert shift(half, full.points / 2) < 0.02
+    assert shift(double, full.points * 3) < 0.02
+
+
+def test_tiny_face_in_a_large_photo(
+    detector: LandmarkDetector, faces: dict[str, Array], as_photo: AsPhoto
+) -> None:
+    truth = detector.detect(as_photo(faces["left"])).points
+    wide = np.full((2400, 3600, 3), 110, np.uint8)
+    wide[1500:2300, 2700:3300] = faces["left"]
+    found = detector.detect(as_photo(wide))
+    assert shift(found, truth + [2700, 1500]) < 0.03
+
+
+@pytest.mark.parametrize(("quarters", "degrees"), [(1, -90), (2, 180), (3, 90)])
+def test_face_on_its_side(
+    detector: LandmarkDetector,
+    faces: dict[str, Array],
+    as_photo: AsPhoto,
+    quarters: int,
+    degrees: int,
+) -> None:
+    upright = detector.detect(as_photo(faces["left"]))
+    turned = detector.detect(as_photo(np.rot90(faces["left"], quarters)))
+    # A quarter turn counterclockwise takes (x, y) of a picture w wide to (y, w - x).
+    truth, rotation, size = upright.points, upright.R_cam_head, (600, 800)
+    for _ in range(quarters):
+        truth = np.column_stack([truth[:, 1], size[0] - truth[:, 0]])
+        rotation = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]) @ rotation
+        size = size[::-1]
+    assert shift(turned, truth) < 1e-6
+    np.testing.assert_allclose(turned.R_cam_head, rotation, atol=1e-9)
+    assert turned.notes == (f"the face was found after turning the photo by {degrees} degrees",)
+
+
+def test_no_face(detector: LandmarkDetector, as_photo: AsPhoto) -> None:
+    ramp = np.tile(np.linspace(0, 255, 400).astype(np.uint8)[:, None, None], (1, 300, 3))
+    with pytest.raises(EstimationError, match=r"^wall\.png: no face found; one must look within"):
+        detector.detect(as_photo(ramp, "wall.png"))
+
+
+def test_several_faces(
+    detector: LandmarkDetector, faces: dict[str, Array], as_photo: AsPhoto
+) -> None:
+    both = np.zeros((800, 1050, 3), np.uint8)
+    both[:, 450:] = faces["left"]
+    both[100:700, :450] = resized(faces["right"], 450)
+    photo = as_photo(both)
+    largest = detector.detect(photo)
+    assert largest.points[NOSE_TIP, 0] > 450
+    assert largest.notes == ("2 faces: number 2 from the left, the largest, is used",)
+    first = detector.detect(photo, face=1)
+    assert first.points[NOSE_TIP, 0] < 450
+    assert not first.notes
+    np.testing.assert_array_equal(detector.detect(photo, face=2).points, largest.points)
+    with pytest.raises(InputError, match=r"face: expected 1 to 2, the faces in face\.png, got 3"):
+        detector.detect(photo, face=3)
+    with pytest.raises(InputError, match="face: expected a number from 1 on, got 0"):
+        detector.detect(photo, face=0)
+
+
+def test_small_faces(
+    detector: LandmarkDetector, faces: dict[str, Array], as_photo: AsPhoto
+) -> None:
+    small = detector.detect(as_photo(resized(faces["right"], 150)))
+    assert "the face is small" in small.notes[0]
+    with pytest.raises(
+        EstimationError, match=r"face\.png: the face is too small, 1\d px between the eyes; 20"
+    ):
+        detector.detect(as_photo(resized(faces["right"], 54)))
