@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from mien.arrays import Array, Float, frozen
 from mien.numeric.sample import bilinear_place
 from mien.numeric.threads import for_row_bands
 from mien.texture.surface import SurfaceMap
-from mien.texture.visibility import Sight, View, camera_numbers, project_point, sight
+from mien.texture.visibility import View, camera_numbers, project_point, sight
 
 # Certainties (cosines) between which a view's colours fade out: a texel that is seen at 80
 # degrees or more is a smear, at 70 degrees it is as good as its surroundings.
@@ -42,83 +42,59 @@ def blend_views(
     *,
     feather_mm: float,
     certainty_power: float,
-    weigh: Callable[[int, Float[Array, "h w"]], Float[Array, "h w"]] | None = None,
 ) -> Blend:
     """The convex combination of the photos on every texel (P02 sec. 5.2.1).
 
     Args:
         gains: (K, 3) factors on each photo's colours; 1 when None.
         feather_mm: as for visibility.sight.
-        certainty_power: g_k = F_k P_k^power.
-        weigh: called with the index of a view and its g_k; returns the weights to use instead.
+        certainty_power: g_k = F_k P_k^power; 1 in the paper.
     """
     shape = surface.triangle_ids.shape
     colours = np.zeros((*shape, 3), np.float32)
     coverage, confidence = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     for k, view in enumerate(views):
         seen = sight(surface, view, feather_mm=feather_mm)
-        weights = view_weights(seen, certainty_power)
-        if weigh is not None:
-            weights = weigh(k, weights)
         gain = np.ones(3) if gains is None else gains[k]
-        add_view(surface, view, weights, gain, colours)
-        coverage += weights
-        np.maximum(confidence, np.where(weights > 0, fade(seen), 0), out=confidence)
+        arrays = (surface.points, seen.feathered, seen.certainty, view.photo)
+        inputs = [frozen(np.ascontiguousarray(array)) for array in arrays]
+        inputs += [camera_numbers(view.camera), frozen(np.asarray(gain, np.float32))]
+
+        def rows(first: int, end: int, inputs: list[Array] = inputs) -> None:
+            _add_rows(*inputs, certainty_power, first, end, colours, coverage, confidence)
+
+        for_row_bands(rows, shape[0], work=coverage.size)
     colours /= np.maximum(coverage, 1e-12)[..., None]
     return Blend(colours, coverage, confidence)
-
-
-def view_weights(seen: Sight, certainty_power: float) -> Float[Array, "h w"]:
-    """(H, W) g_k = F_k P_k^power (P02 sec. 5.2.2, step 3)."""
-    if certainty_power == 1:
-        return seen.feathered * seen.certainty
-    weights: Array = seen.feathered * seen.certainty ** np.float32(certainty_power)
-    return weights
-
-
-def fade(seen: Sight) -> Float[Array, "h w"]:
-    """(H, W) in [0, 1]: how far one view's colour may stand by itself."""
-    low, high = _FADE
-    t = np.clip((seen.certainty - low) / (high - low), 0, 1)
-    faded: Array = seen.feathered * t
-    return faded
-
-
-def add_view(
-    surface: SurfaceMap,
-    view: View,
-    weights: Float[Array, "h w"],
-    gain: Float[Array, " 3"],
-    colours: Float[Array, "h w 3"],
-) -> None:
-    """Add weight x gain x photo to colours, (H, W, 3) float32, in place."""
-    arrays = (surface.points, weights.astype(np.float32), view.photo)
-    inputs = [frozen(np.ascontiguousarray(array)) for array in arrays]
-    pose, factor = camera_numbers(view.camera), frozen(np.asarray(gain, np.float32))
-
-    def rows(first: int, end: int) -> None:
-        _add_rows(*inputs, pose, factor, first, end, colours)
-
-    for_row_bands(rows, colours.shape[0], work=weights.size)
 
 
 @njit(cache=True, nogil=True)
 def _add_rows(
     points: Array,
-    weights: Array,
+    feathered: Array,
+    certainty: Array,
     photo: Array,
     pose: Array,
     gain: Array,
+    power: float,
     first: int,
     end: int,
     colours: Array,
+    coverage: Array,
+    confidence: Array,
 ) -> None:
+    """Add one photo, weighted by g_k, to the sums."""
     height, width = photo.shape[:2]
+    low, high = _FADE
     for row in range(first, end):
-        for col in range(weights.shape[1]):
-            weight = weights[row, col]
-            if weight <= 0.0:
+        for col in range(coverage.shape[1]):
+            if feathered[row, col] <= 0.0:
                 continue
+            cosine = certainty[row, col]
+            weight = feathered[row, col] * (cosine if power == 1.0 else cosine**power)
+            coverage[row, col] += weight
+            alone = feathered[row, col] * min(max((cosine - low) / (high - low), 0.0), 1.0)
+            confidence[row, col] = max(confidence[row, col], alone)
             x, y, z = points[row, col]
             px, py, _ = project_point(pose, x, y, z)
             x0, x1, y0, y1, fx, fy = bilinear_place(px, py, width, height)

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from mien.arrays import Array, Float
-from mien.texture.blend import add_view, view_weights
+from mien.texture.blend import blend_views
 from mien.texture.surface import SurfaceMap
-from mien.texture.visibility import View, sight
+from mien.texture.visibility import View
 
 # Colours outside this range (of 255) tell little: dark ones are noise, bright ones are clipped.
 _RANGE = (16, 245)
@@ -60,10 +60,8 @@ def _samples(
     surface: SurfaceMap, view: View, feather_mm: float, power: float
 ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
     """Colours and weights on the texels of the surface; weight zero where they tell little."""
-    weights = view_weights(sight(surface, view, feather_mm=feather_mm), power)
-    colours = np.zeros((*weights.shape, 3), np.float32)
-    add_view(surface, view, (weights > 0).astype(np.float32), np.ones(3), colours)
+    blend = blend_views(surface, [view], feather_mm=feather_mm, certainty_power=power)
     low, high = _RANGE
-    useful = (colours.min(axis=2) > low) & (colours.max(axis=2) < high)
-    weights = np.where(useful, weights, 0)
-    return np.maximum(colours, 1).reshape(-1, 3), weights.reshape(-1)
+    useful = (blend.colours.min(axis=2) > low) & (blend.colours.max(axis=2) < high)
+    weights = np.where(useful, blend.coverage, 0)
+    return np.maximum(blend.colours, 1).reshape(-1, 3), weights.reshape(-1)

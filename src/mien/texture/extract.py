@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,9 +13,9 @@ from mien.errors import EstimationError, InputError
 from mien.mesh import Mesh
 from mien.texture.atlas import fill_gutters
 from mien.texture.blend import Blend, blend_views
-from mien.texture.cylinder import Cylinder, cylinder_surface, fit_cylinder
+from mien.texture.cylinder import cylinder_surface, fit_cylinder
 from mien.texture.equalize import estimate_gains
-from mien.texture.fill import FILLS, Fill, fill_image, from_cylinder, mix, over
+from mien.texture.fill import FILLS, Backdrop, Fill, make_backdrop, mix, over
 from mien.texture.parts import SEE_THROUGH, SKIN, STYLES, PartStyle, fill_colour
 from mien.texture.subject import subject_mask
 from mien.texture.surface import SurfaceMap, cropped, mirrored, parts_of, restricted
@@ -64,6 +64,7 @@ def extract_texture(
     equalize: bool = True,
     fill: Fill = "pyramid",
     mirror: Int[Array, " v"] | None = None,
+    regions: Mapping[str, Float[Array, " v"]] | None = None,
     find_subject: bool = True,
 ) -> Texture:
     """The colour of every texel, from the photos that see it.
@@ -77,6 +78,8 @@ def extract_texture(
         equalize: even out exposure and white balance between photos.
         fill: what becomes of texels that no photo shows; black with "none".
         mirror: (V,) left-right partners; then those texels take the other side's colours first.
+        regions: (V,) soft masks by name (those of the generic head): hair, ears and neck are then
+            filled each from itself, and the mouth's inside is dark red.
         find_subject: tell person from background in the photos; else trust the mesh's outline.
     Raises: InputError: counts and sizes that differ. EstimationError: no photo sees the mesh.
     Source: P02 sec. 5.2.1, 5.2.2. Differs: colours seen at a grazing angle fade into the filled
@@ -94,8 +97,8 @@ def extract_texture(
     around = _blend(job, coarse, SKIN)
     if not around.coverage.any():
         raise EstimationError("no photo sees the head where its camera says it is")
-    below = around.colours if fill == "none" else fill_image(around, fill, wrap=True)
-    pixels = _background(surface, below)
+    backdrop = make_backdrop(coarse, mesh, around, cylinder, fill, regions or {})
+    pixels = _background(surface, backdrop)
     coverage = np.zeros(surface.triangle_ids.shape, np.float32)
     for name in mesh.part_names:
         texels = parts_of(surface, mesh, name)
@@ -103,7 +106,7 @@ def extract_texture(
         if box is None:
             continue
         part = restricted(cropped(surface, box), texels[box])
-        colours, weights = _texture_part(job, part, name, cylinder, below)
+        colours, weights = _texture_part(job, part, name, backdrop)
         pixels[box][part.mask] = colours[part.mask]
         coverage[box][part.mask] = weights[part.mask]
     result = np.clip(np.rint(pixels), 0, 255).astype(np.uint8)
@@ -136,9 +139,9 @@ def _prepare(
 
 
 def _texture_part(
-    job: _Job, surface: SurfaceMap, name: str, cylinder: Cylinder, below: Float[Array, "h w 3"]
+    job: _Job, surface: SurfaceMap, name: str, backdrop: Backdrop
 ) -> tuple[Float[Array, "h w 3"], Float[Array, "h w"]]:
-    """Colours and coverage of one part; `below` is the filled skin on the coarse cylinder."""
+    """Colours and coverage of one part."""
     style = STYLES.get(name, SKIN)
     blend = _blend(job, surface, style)
     if job.fill == "none":
@@ -147,7 +150,7 @@ def _texture_part(
         return mix(blend.colours, fill_colour(style, blend), blend.confidence), blend.coverage
     colours = blend.colours.copy()
     holes = surface.mask & (blend.confidence < 1)
-    filled = from_cylinder(below, cylinder, surface, holes)
+    filled = backdrop.colours(surface, job.mesh, holes)
     share = blend.confidence[holes][:, None]
     colours[holes] = filled + share * (colours[holes] - filled)
     return colours, blend.coverage
@@ -179,14 +182,14 @@ def _blend(job: _Job, surface: SurfaceMap, style: PartStyle) -> Blend:
     return over(blend, blended(mirrored(surface, job.mesh, job.mirror), everything))
 
 
-def _background(surface: SurfaceMap, below: Float[Array, "h w 3"]) -> Float[Array, "h w 3"]:
+def _background(surface: SurfaceMap, backdrop: Backdrop) -> Float[Array, "h w 3"]:
     """(H, W, 3) float32: what texels without a surface show, before gutters are filled."""
     import cv2
 
     height, width = surface.triangle_ids.shape
     if not surface.wrap:
         return np.zeros((height, width, 3), np.float32)
-    wide: Array = cv2.resize(below, (width, height), interpolation=cv2.INTER_LINEAR)
+    wide: Array = cv2.resize(backdrop.images[-1], (width, height), interpolation=cv2.INTER_LINEAR)
     return wide
 
 

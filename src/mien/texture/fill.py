@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from mien.arrays import Array, Float
+from mien.arrays import Array, Bool, Float
+from mien.mesh import Mesh
 from mien.numeric.pyramid import fill_growing, fill_pyramid
 from mien.numeric.sample import sample_bilinear
 from mien.texture.blend import Blend
 from mien.texture.cylinder import Cylinder
-from mien.texture.surface import SurfaceMap
+from mien.texture.parts import FILLED_ALONE, REGION_COLOURS
+from mien.texture.surface import SurfaceMap, over_vertices
 
 Fill = Literal["pyramid", "grow", "none"]
 FILLS: tuple[Fill, ...] = ("pyramid", "grow", "none")
 
+# A region is filled from itself when the photos show this many of its coarse texels (4 cm^2).
+_FEWEST = 300
+
 
 def fill_image(blend: Blend, fill: Fill, *, wrap: bool) -> Float[Array, "h w 3"]:
     """The colours with their holes filled, (H, W, 3) float32; half-certain ones are mixed in."""
+    if fill == "none":
+        return blend.colours
     if fill == "grow":
         grown = fill_growing(blend.colours, blend.confidence > 0.5, wrap=wrap)
         return mix(blend.colours, grown, blend.confidence)
@@ -42,16 +51,73 @@ def over(blend: Blend, below: Blend) -> Blend:
     return Blend(colours.astype(np.float32), blend.coverage, confidence.astype(np.float32))
 
 
-def from_cylinder(
-    image: Float[Array, "h w 3"], cylinder: Cylinder, surface: SurfaceMap, texels: Array
-) -> Float[Array, "n 3"]:
-    """Colours of chosen texels (boolean mask) from an image on the cylinder around them.
+@dataclass(frozen=True)
+class Backdrop:
+    """What the skin looks like where no photo shows it.
 
-    The cylinder has no seams but at the back, where it wraps: a fill that is made on it is smooth
-    across every seam between charts.
+    Made on a coarse cylinder, which has no seams: a fill that is smooth there is smooth across
+    every seam between charts of whatever layout.
+
+    Attributes:
+        cylinder: around the head.
+        images: (R, H, W, 3) float32, for each region its colours continued over the cylinder.
+        masks: (R, V) how far each vertex belongs to the region; they sum to 1.
     """
-    height, width = image.shape[:2]
-    uvs = cylinder.uvs(surface.points[texels].astype(np.float64))
-    padded = np.concatenate([image[:, -1:], image, image[:, :1]], axis=1)
-    places = np.column_stack([uvs[:, 0] * width + 1, (1 - uvs[:, 1]) * height])
-    return sample_bilinear(padded, places)
+
+    cylinder: Cylinder
+    images: Float[Array, "r h w 3"]
+    masks: Float[Array, "r v"]
+
+    def colours(
+        self, surface: SurfaceMap, mesh: Mesh, texels: Bool[Array, "h w"]
+    ) -> Float[Array, "n 3"]:
+        """(N, 3) float32 of chosen texels."""
+        height, width = self.images.shape[1:3]
+        uvs = self.cylinder.uvs(surface.points[texels].astype(np.float64))
+        # One column more at either end, so that lookups go around.
+        places = np.column_stack([uvs[:, 0] * width + 1, (1 - uvs[:, 1]) * height])
+        total = np.zeros((len(places), 3), np.float32)
+        for image, mask in zip(self.images, self.masks, strict=True):
+            share = over_vertices(surface, mesh, mask, texels)
+            inside = share > 1e-3
+            padded = np.concatenate([image[:, -1:], image, image[:, :1]], axis=1)
+            total[inside] += share[inside, None] * sample_bilinear(padded, places[inside])
+        return total
+
+
+def make_backdrop(
+    coarse: SurfaceMap,
+    mesh: Mesh,
+    blend: Blend,
+    cylinder: Cylinder,
+    fill: Fill,
+    regions: Mapping[str, Float[Array, " v"]],
+) -> Backdrop:
+    """The holes of the skin filled region by region, hair from hair and ears from ears.
+
+    Args:
+        coarse: the skin on the cylinder. blend: the photos on it.
+        regions: (V,) soft masks by name; what they leave, and every region of which the photos
+            show next to nothing, is filled from everything.
+    """
+    height, width = coarse.triangle_ids.shape
+    everything = fill_image(blend, fill, wrap=True)
+    images, masks = [], []
+    left = np.ones(len(mesh.vertices))
+    for name in (*FILLED_ALONE, *REGION_COLOURS):
+        if name not in regions:
+            continue
+        mask = np.minimum(regions[name], left)
+        if name in REGION_COLOURS:
+            image = np.broadcast_to(np.array(REGION_COLOURS[name], np.float32), (height, width, 3))
+        else:
+            inside = np.zeros((height, width), np.float32)
+            inside[coarse.mask] = over_vertices(coarse, mesh, mask, coarse.mask)
+            own = replace(blend, confidence=blend.confidence * (inside > 0.5))
+            if own.confidence.sum() < _FEWEST:
+                continue
+            image = fill_image(own, fill, wrap=True)
+        images.append(image)
+        masks.append(mask)
+        left = left - mask
+    return Backdrop(cylinder, np.stack([*images, everything]), np.stack([*masks, left]))

@@ -46,6 +46,13 @@ STYLES = {
     "hair": PartStyle("blend", "surface", (60, 48, 40)),
 }
 
+# Regions of the skin (soft masks by name) whose holes are filled from the region itself: hair must
+# not run into the neck, nor an ear's pink into the hair behind it.
+FILLED_ALONE = ("left_ear", "right_ear", "scalp", "neck")
+
+# Regions of the skin that photos of a closed mouth do not show, and their plain colours.
+REGION_COLOURS = {"mouth_cavity": (92, 40, 40)}
+
 # Parts that are so thin or so loosely modelled that they must not hide what is behind them.
 SEE_THROUGH = ("lashes", "hair")
 

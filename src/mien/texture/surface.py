@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +21,7 @@ class SurfaceMap:
         normals: (H, W, 3) float32, unit, outward.
         triangle_ids: (H, W) int32 into the mesh's triangles, -1 where there is no surface.
         barycentrics: (H, W, 3) float32.
+        texel_mm: how far apart neighbouring texels lie on the surface: the median.
         wrap: the left and right ends touch, as on a cylinder.
     """
 
@@ -29,6 +29,7 @@ class SurfaceMap:
     normals: Float[Array, "h w 3"]
     triangle_ids: Int[Array, "h w"]
     barycentrics: Float[Array, "h w 3"]
+    texel_mm: float
     wrap: bool = False
 
     @property
@@ -36,20 +37,6 @@ class SurfaceMap:
         """(H, W) bool: where there is a surface."""
         inside: Array = self.triangle_ids >= 0
         return inside
-
-    @cached_property
-    def texel_mm(self) -> float:
-        """How far apart neighbouring texels lie on the surface: the median over both directions."""
-        steps = []
-        for axis in (0, 1):
-            there, here = np.diff(self.points, axis=axis), np.diff(self.triangle_ids, axis=axis)
-            inside = np.minimum(*_neighbours(self.triangle_ids, axis)) >= 0
-            # Texels of one triangle: across others there may be a fold or a seam between.
-            steps.append(np.linalg.norm(there[inside & (here == 0)], axis=1))
-        lengths = np.concatenate(steps)
-        if not len(lengths):
-            raise InputError("surface", "neighbouring texels on one triangle", "none")
-        return float(np.median(lengths))
 
 
 def surface_from(
@@ -59,13 +46,22 @@ def surface_from(
     *,
     wrap: bool = False,
 ) -> SurfaceMap:
-    """The surface under texels whose triangles and places in them are known."""
-    raster = Raster(triangle_ids, barycentrics, np.empty((0, 0), np.float32))
-    points = interpolate(raster, mesh.triangles, mesh.vertices)
-    normals = interpolate(raster, mesh.triangles, mesh.vertex_normals())
-    lengths = np.sqrt(np.einsum("hwc,hwc->hw", normals, normals))
-    normals /= np.maximum(lengths, 1e-12)[..., None]
-    return SurfaceMap(points, normals, triangle_ids, barycentrics, wrap)
+    """The surface under texels whose triangles and places in them are known.
+
+    Raises: InputError: so few texels that no two neighbours lie on one triangle.
+    """
+    points, normals = _points_and_normals(mesh, triangle_ids, barycentrics, np.s_[:])
+    texel_mm = _texel_mm(points, triangle_ids)
+    return SurfaceMap(points, normals, triangle_ids, barycentrics, texel_mm, wrap)
+
+
+def over_vertices(
+    surface: SurfaceMap, mesh: Mesh, values: Float[Array, " v"], texels: Bool[Array, "h w"]
+) -> Float[Array, " n"]:
+    """Values at the mesh's vertices, interpolated at chosen texels."""
+    corners = np.asarray(values, np.float32)[mesh.triangles[surface.triangle_ids[texels]]]
+    inside: Array = np.einsum("nc,nc->n", corners, surface.barycentrics[texels])
+    return inside
 
 
 def parts_of(surface: SurfaceMap, mesh: Mesh, *names: str) -> Bool[Array, "h w"]:
@@ -79,17 +75,17 @@ def parts_of(surface: SurfaceMap, mesh: Mesh, *names: str) -> Bool[Array, "h w"]
 def restricted(surface: SurfaceMap, keep: Bool[Array, "h w"]) -> SurfaceMap:
     """The same surface with only the texels to keep."""
     ids = np.where(keep, surface.triangle_ids, -1).astype(np.int32)
-    return SurfaceMap(surface.points, surface.normals, ids, surface.barycentrics, surface.wrap)
+    return replace(surface, triangle_ids=ids)
 
 
 def cropped(surface: SurfaceMap, box: tuple[slice, slice]) -> SurfaceMap:
     """The rectangle of texels in the given rows and columns."""
-    return SurfaceMap(
-        surface.points[box],
-        surface.normals[box],
-        surface.triangle_ids[box],
-        surface.barycentrics[box],
-        surface.wrap,
+    return replace(
+        surface,
+        points=np.ascontiguousarray(surface.points[box]),
+        normals=np.ascontiguousarray(surface.normals[box]),
+        triangle_ids=np.ascontiguousarray(surface.triangle_ids[box]),
+        barycentrics=np.ascontiguousarray(surface.barycentrics[box]),
     )
 
 
@@ -104,16 +100,31 @@ def mirrored(surface: SurfaceMap, mesh: Mesh, mirror: Int[Array, " v"]) -> Surfa
     """
     if np.shape(mirror) != (len(mesh.vertices),):
         raise InputError("mirror", f"{len(mesh.vertices)} indices", f"shape {np.shape(mirror)}")
-    mirror = np.asarray(mirror)
-    raster = Raster(surface.triangle_ids, surface.barycentrics, np.empty((0, 0), np.float32))
-    points = interpolate(raster, mesh.triangles, mesh.vertices[mirror])
-    normals = interpolate(raster, mesh.triangles, mesh.vertex_normals()[mirror])
+    points, normals = _points_and_normals(
+        mesh, surface.triangle_ids, surface.barycentrics, np.asarray(mirror)
+    )
+    return replace(surface, points=points, normals=normals)
+
+
+def _points_and_normals(
+    mesh: Mesh, triangle_ids: Array, barycentrics: Array, vertices: Array | slice
+) -> tuple[Array, Array]:
+    """Interpolated over the texels, each vertex standing for the one given for it."""
+    raster = Raster(triangle_ids, barycentrics, np.empty((0, 0), np.float32))
+    points = interpolate(raster, mesh.triangles, mesh.vertices[vertices])
+    normals = interpolate(raster, mesh.triangles, mesh.vertex_normals()[vertices])
     lengths = np.sqrt(np.einsum("hwc,hwc->hw", normals, normals))
     normals /= np.maximum(lengths, 1e-12)[..., None]
-    return SurfaceMap(points, normals, surface.triangle_ids, surface.barycentrics, surface.wrap)
+    return points, normals
 
 
-def _neighbours(array: Array, axis: int) -> tuple[Array, Array]:
-    if axis == 0:
-        return array[:-1], array[1:]
-    return array[:, :-1], array[:, 1:]
+def _texel_mm(points: Array, triangle_ids: Array) -> float:
+    steps = []
+    for near, far in ((np.s_[::3, :-1], np.s_[::3, 1:]), (np.s_[:-1, ::3], np.s_[1:, ::3])):
+        # Texels of one triangle: between others there may be a fold or a seam.
+        same = (triangle_ids[near] == triangle_ids[far]) & (triangle_ids[near] >= 0)
+        steps.append(np.linalg.norm(points[far][same] - points[near][same], axis=1))
+    lengths = np.concatenate(steps)
+    if not len(lengths):
+        raise InputError("surface", "neighbouring texels on one triangle", "none")
+    return float(np.median(lengths))

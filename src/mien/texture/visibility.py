@@ -116,9 +116,10 @@ def sight(
 
     for_row_bands(rows, height, work=width * height)
     # Beyond a chart's edge nothing is known, so it does not count as a boundary.
-    seen = visible.astype(bool) | (surface.triangle_ids < 0)
+    seen = (visible > 0) | (surface.triangle_ids < 0)
     feathered = feather(seen, feather_mm / surface.texel_mm, wrap=surface.wrap)
-    return Sight(feathered * visible, certainty)
+    feathered[surface.triangle_ids < 0] = 0
+    return Sight(feathered, certainty)
 
 
 def feather(
@@ -136,16 +137,10 @@ def feather(
         return visible.astype(np.float32)
     margin = min(int(np.ceil(width)) + 1, visible.shape[1]) if wrap else 0
     padded = np.pad(visible, ((0, 0), (margin, margin)), mode="wrap").astype(np.uint8)
-    distance = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    # The distance to the nearest invisible pixel is 1 for a pixel at the boundary.
-    ramp = smoothstep((distance[:, margin : margin + visible.shape[1]] - 0.5) / width)
-    return np.where(visible, ramp, 0).astype(np.float32)
-
-
-def smoothstep(t: Array) -> Array:
-    """The cubic from 0 at t <= 0 to 1 at t >= 1 with level ends."""
-    t = np.clip(t, 0, 1)
-    ramp: Array = t * t * (3 - 2 * t)
+    ramp: Array = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    ramp = ramp[:, margin : margin + visible.shape[1]]
+    # The nearest invisible pixel's centre is 1 away from a pixel at the boundary.
+    for_row_bands(lambda a, b: _ramp_rows(ramp, width, a, b), len(ramp), work=ramp.size)
     return ramp
 
 
@@ -199,6 +194,15 @@ def _away_from_edges(depth: Array, outline_px: float, occlusion_px: float) -> Bo
     clear = cv2.distanceTransform((~edges).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     away: Array = far & (clear > occlusion_px)
     return away
+
+
+@njit(cache=True, nogil=True)
+def _ramp_rows(distance: Array, width: float, first: int, end: int) -> None:
+    """Distances to their ramp, in place."""
+    for row in range(first, end):
+        for col in range(distance.shape[1]):
+            t = min(max((distance[row, col] - 0.5) / width, 0.0), 1.0)
+            distance[row, col] = t * t * (3.0 - 2.0 * t)
 
 
 @njit(cache=True, nogil=True)
