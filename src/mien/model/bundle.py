@@ -12,6 +12,7 @@ from mien.numeric.rotation import cross_matrix, rotation_from_vector
 from mien.numeric.schur import BlockSystem
 
 __all__ = [
+    "POSE_SIZE",
     "Bundle",
     "BundleData",
     "ShapePrior",
@@ -188,7 +189,8 @@ def _columns(photo: int, photos: int, group: Int[Array, " k"]) -> Int[Array, " 7
 
 
 def _focal_residuals(bundle: Bundle, data: BundleData) -> Float[Array, " g"]:
-    return data.log_focal_precision * (bundle.log_focal - data.log_focal_mean)
+    residuals: Array = data.log_focal_precision * (bundle.log_focal - data.log_focal_mean)
+    return residuals
 
 
 def _shape_residuals(bundle: Bundle, shape: ShapePrior) -> Float[Array, "n 3"]:

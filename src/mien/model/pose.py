@@ -135,30 +135,32 @@ def _start(
         rotations = check_array("rotations", rotations, (count, 3, 3))
     if focal_px is not None:
         focal_px = check_array("focal_px", focal_px, (count,))
-    poses, problems = [], []
-    for k in range(count):
-        photo = problem.of(np.arange(count) == k)
-        seen = np.count_nonzero(photo.weights)
-        if seen < _MIN_POINTS:
-            poses.append(Poses.identity(1))
-            problems.append(f"shows {seen} points, needs {_MIN_POINTS}")
-            continue
-        if rotations is None:
-            pose = estimate_poses(photo.image, photo.weights, photo.points)
-        else:
-            focal = None if focal_px is None else focal_px[k : k + 1]
-            pose = poses_from_rotations(
-                rotations[k : k + 1], focal, photo.image, photo.weights, photo.points
-            )
-        pose, misfit = resect_robustly(pose, photo.points, photo.image, photo.weights, loss)
-        poses.append(pose)
-        problems.append(
-            f"its points lie {misfit:.0f} mm off any view of the initial shape, "
-            f"at most {max_misfit_mm:.0f} mm would do"
-            if misfit > max_misfit_mm
-            else ""
+    seen = np.count_nonzero(problem.weights, axis=1)
+    enough = seen >= _MIN_POINTS
+    problems = [
+        "" if ok else f"shows {n} points, needs {_MIN_POINTS}"
+        for ok, n in zip(enough, seen, strict=True)
+    ]
+    if not enough.any():
+        return Poses.identity(count), problems
+    given = problem.of(enough)
+    if rotations is None:
+        poses = estimate_poses(given.image, given.weights, given.points)
+    else:
+        focal = None if focal_px is None else focal_px[enough]
+        poses = poses_from_rotations(
+            rotations[enough], focal, given.image, given.weights, given.points
         )
-    return Poses.stacked(poses), problems
+    poses, misfits = resect_robustly(poses, given.points, given.image, given.weights, loss)
+    for k, misfit in zip(np.flatnonzero(enough), misfits, strict=True):
+        if misfit > max_misfit_mm:
+            problems[k] = (
+                f"its points lie {misfit:.0f} mm off any view of the initial shape, "
+                f"at most {max_misfit_mm:.0f} mm would do"
+            )
+    # Photos with too few points keep a place in the arrays, never used.
+    places = np.where(enough, np.cumsum(enough) - 1, len(poses.s))
+    return Poses.stacked([poses, Poses.identity(1)]).of(places), problems
 
 
 def _solve(

@@ -95,26 +95,30 @@ def resect(
 
 
 def resect_robustly(
-    pose: Poses,
+    poses: Poses,
     points: Float[Array, "n 3"],
-    image: Float[Array, "1 n 2"],
-    weights: Float[Array, "1 n"],
+    image: Float[Array, "k n 2"],
+    weights: Float[Array, "k n"],
     loss: str,
-) -> tuple[Poses, float]:
-    """One photo's pose over fixed points, and the robust deviation of its points from it in mm.
+) -> tuple[Poses, Float[Array, " k"]]:
+    """Poses over fixed points, and each photo's robust deviation from its pose in mm.
 
     The deviation is measured by the extent of the points, so that a pose gone wrong cannot hide
     or inflate it.
     """
-    seen, trust, sigma = weights > 0, weights, np.inf
+    trust, sigma = weights, np.ones(len(weights))
     for _ in range(_ROUNDS):
-        pose = resect(pose, points, image, trust)
-        lengths = np.linalg.norm(reprojection(pose, points) - image, axis=-1)
-        sigma = max(robust_sigma(lengths[seen]), SIGMA_FLOOR_PX)
-        trust = weights * loss_named(loss)((lengths / sigma) ** 2)[1]
-    extent_mm = np.sqrt(points[seen[0]].var(axis=0).sum())
-    extent_px = np.sqrt(image[seen].var(axis=0).sum())
-    return pose, float(sigma * extent_mm / max(extent_px, 1e-12))
+        poses = resect(poses, points, image, trust)
+        lengths = np.linalg.norm(reprojection(poses, points) - image, axis=-1)
+        sigma = np.array([robust_sigma(d[w > 0]) for d, w in zip(lengths, weights, strict=True)])
+        sigma = np.maximum(sigma, SIGMA_FLOOR_PX)
+        trust = weights * loss_named(loss)((lengths / sigma[:, None]) ** 2)[1]
+    return poses, sigma * np.array(
+        [
+            np.sqrt(points[w > 0].var(axis=0).sum() / max(x[w > 0].var(axis=0).sum(), 1e-12))
+            for x, w in zip(image, weights, strict=True)
+        ]
+    )
 
 
 def _scaled_rotation(image: Array, weights: Array, points: Array) -> Float[Array, "3 3"]:
