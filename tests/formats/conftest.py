@@ -1,15 +1,54 @@
-"""A small head: two parts, a texture seam, three face units and one photographed expression."""
+"""Heads to write and read, and the Khronos validator."""
 
 from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mien.assets.generic import load_generic_head
 from mien.camera import Camera
 from mien.mesh import Mesh
 from mien.model.head import Expression, FittedView, Head
 
+HERE = Path(__file__).parent
 COLUMNS, ROWS = 12, 7
+
+
+@pytest.fixture
+def gltf_remarks() -> Callable[[Path], list[str]]:
+    """All that the Khronos validator says of a .glb: errors, warnings and advice."""
+    node = shutil.which("node")
+    if node is None or not (HERE / "node_modules" / "gltf-validator").is_dir():
+        pytest.skip("no gltf-validator: run `npm ci` in tests/formats")
+
+    def remarks(path: Path) -> list[str]:
+        command = [node, HERE / "validate_gltf.cjs", path]
+        run = subprocess.run(command, capture_output=True, text=True, check=True)
+        messages = json.loads(run.stdout)["issues"]["messages"]
+        return [f"{item['code']} at {item.get('pointer')}: {item['message']}" for item in messages]
+
+    return remarks
+
+
+@pytest.fixture(scope="session")
+def generic() -> Head:
+    """The generic head itself, as if it were somebody's."""
+    asset = load_generic_head()
+    return Head(
+        subject="nobody",
+        mesh=asset.mesh,
+        expressions={"neutral": Expression(asset.mesh.vertices)},
+        uncertainty_mm=np.ones(len(asset.mesh.vertices)),
+        unit_names=asset.unit_names,
+        unit_offsets=asset.unit_offsets,
+        textures={"atlas": _checker(0)},
+    )
 
 
 @pytest.fixture

@@ -2,9 +2,8 @@ from __future__ import annotations
 
 import io
 import json
-import shutil
 import struct
-import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,6 @@ from mien.errors import InputError
 from mien.formats.gltf import glb_bytes, save_glb
 from mien.model.head import Head
 
-HERE = Path(__file__).parent
 KINDS = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 
@@ -68,39 +66,28 @@ class Glb:
         return self.array(primitive["targets"][names.index(name)]["POSITION"])[triangles]
 
 
-def problems(path: Path, *, severity: int) -> list[str]:
-    """The Khronos validator's remarks; severity 0 is an error, 1 a warning, 2 and 3 advice."""
-    node = shutil.which("node")
-    if node is None or not (HERE / "node_modules" / "gltf-validator").is_dir():
-        pytest.skip("no gltf-validator: run `npm ci` in tests/formats")
-    run = subprocess.run(
-        [node, HERE / "validate_gltf.cjs", path], capture_output=True, text=True, check=True
-    )
-    messages = json.loads(run.stdout)["issues"]["messages"]
-    return [
-        f"{item['code']} at {item.get('pointer')}: {item['message']}"
-        for item in messages
-        if item["severity"] <= severity
-    ]
-
-
 @pytest.mark.parametrize("lit", [True, False])
 @pytest.mark.parametrize("image", ["JPEG", "PNG"])
 def test_the_khronos_validator_has_nothing_to_say(
-    small_head: Head, tmp_path: Path, lit: bool, image: Any
+    small_head: Head,
+    tmp_path: Path,
+    gltf_remarks: Callable[[Path], list[str]],
+    lit: bool,
+    image: Any,
 ) -> None:
     save_glb(small_head, tmp_path / "head.glb", lit=lit, image=image)
-    assert problems(tmp_path / "head.glb", severity=3) == []
+    assert gltf_remarks(tmp_path / "head.glb") == []
 
 
-def test_nor_about_a_head_without_texture_and_targets(small_head: Head, tmp_path: Path) -> None:
+def test_nor_about_a_head_without_texture_and_targets(
+    small_head: Head, tmp_path: Path, gltf_remarks: Callable[[Path], list[str]]
+) -> None:
     neutral = {"neutral": small_head.expressions["neutral"]}
     plain = replace(small_head, textures={}, expressions=neutral)
     save_glb(plain, tmp_path / "head.glb", units=False)
     # The one remark left: texture coordinates that no material uses, kept for the user's own.
-    assert {line.split()[0] for line in problems(tmp_path / "head.glb", severity=3)} == {
-        "UNUSED_OBJECT"
-    }
+    remarks = gltf_remarks(tmp_path / "head.glb")
+    assert {remark.split()[0] for remark in remarks} == {"UNUSED_OBJECT"}
 
 
 def test_triangles_are_the_meshs_in_metres(small_head: Head) -> None:
@@ -192,9 +179,7 @@ def test_parts_can_be_chosen(small_head: Head) -> None:
     assert Glb(glb_bytes(small_head, parts=["left_eyeball"])).material_names == ["eyes"]
     with pytest.raises(InputError, match=r"part: expected skin or .* or hair, got nose"):
         glb_bytes(small_head, parts=["nose"])
-    with pytest.raises(
-        InputError, match="part: expected at least one that has triangles, got hair"
-    ):
+    with pytest.raises(InputError, match="part: expected at least one that has triangles"):
         glb_bytes(small_head, parts=["hair"])
 
 

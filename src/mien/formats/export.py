@@ -15,7 +15,7 @@ def export_head(
     """Write the head as .glb, .obj (with .mtl and .png beside it) or .usdz.
 
     Args:
-        parts: names of the mesh's parts; by default all but the hair cap.
+        parts: names of the mesh's parts; by default all but the hair cap and the lashes.
         units: with the face units as morph targets; an .obj cannot hold any.
     Raises: InputError: another suffix, an unknown part, a place that cannot be written;
         for .usdz that usd-core is not installed.

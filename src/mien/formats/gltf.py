@@ -42,7 +42,7 @@ def save_glb(
     would double the file: Blender computes them anew, real-time viewers shade with neutral's.
 
     Args:
-        parts: names of parts; by default all but the hair cap.
+        parts: names of parts; by default all but the hair cap and the lashes.
         units: with the face units.
         lit: materials that the viewer's lights shade, which Blender opens as a Principled BSDF
             that can be worked on. False marks them unlit (KHR_materials_unlit): the texture as

@@ -187,6 +187,8 @@ def _write_photo(folder: Path, name: str, pixels: UInt8[Array, "h w 3"]) -> str:
     if kind is None:
         relative, kind = relative.with_name(f"{relative.name}.jpg"), "JPEG"
     file = folder / relative
+    if file.exists():
+        raise InputError("photos", "every name once", f"{name} twice")
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(encode_image(pixels, kind))
     return str(relative)

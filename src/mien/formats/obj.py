@@ -23,7 +23,7 @@ def save_obj(head: Head, path: str | Path, *, parts: Iterable[str] | None = None
     A group and a material for each group of parts. Face units have no place in the format.
 
     Args:
-        parts: names of parts; by default all but the hair cap.
+        parts: names of parts; by default all but the hair cap and the lashes.
     Raises: InputError: an unknown part, a place that cannot be written.
     """
     path = Path(path)

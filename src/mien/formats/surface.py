@@ -11,6 +11,7 @@ from mien.arrays import Array, Float, Int, UInt8
 from mien.errors import InputError
 from mien.mesh import Mesh
 from mien.model.head import ATLAS, NEUTRAL, Head
+from mien.render.shade import shown_parts
 
 # Parts that share a material; a part that is not listed has one of its own name.
 _MATERIALS = {
@@ -23,9 +24,6 @@ _MATERIALS = {
 # already carry the highlights that were there, so nothing is made as shiny as it is.
 _ROUGHNESS = {"skin": 0.7, "eyes": 0.3, "teeth": 0.4, "tongue": 0.5}
 _DEFAULT_ROUGHNESS = 0.9
-
-# The hair cap is there to be fitted and seen through, not to be seen.
-_LEFT_OUT = {"hair"}
 
 # Smaller offsets are the residue of a transfer (mm); written out, they would make every morph
 # target as large as the whole mesh.
@@ -82,13 +80,12 @@ def export_surface(
     called NAME_photo.
 
     Args:
-        parts: names; by default all but the hair cap.
+        parts: names; by default those that pictures show, all but the hair cap and the lashes.
         units: with the face units.
     Raises: InputError: an unknown part, nothing left to export.
     """
-    if parts is None:
-        parts = (name for name in head.mesh.part_names if name not in _LEFT_OUT)
-    triangles = _whole_triangles(head.mesh, tuple(parts))
+    chosen = shown_parts(head.mesh) if parts is None else tuple(parts)
+    triangles = _whole_triangles(head.mesh, chosen)
     mesh, kept = _compacted(head.mesh.submesh(triangles))
     materials = [_MATERIALS.get(name, name) for name in mesh.part_names]
     material = np.array(materials)[mesh.part]

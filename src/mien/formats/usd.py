@@ -37,7 +37,7 @@ def save_usdz(
     animation that holds their weights, all zero.
 
     Args:
-        parts: names of parts; by default all but the hair cap.
+        parts: names of parts; by default all but the hair cap and the lashes.
         units: with the face units.
     Raises: InputError: usd-core is not installed; an unknown part, a place that cannot be written.
     """
