@@ -66,7 +66,7 @@ def test_tiny_face_in_a_large_photo(
     wide = np.full((2400, 3600, 3), 110, np.uint8)
     wide[1500:2300, 2700:3300] = faces["left"]
     found = detector.detect(as_photo(wide))
-    assert shift(found, truth + [2700, 1500]) < 0.03
+    assert shift(found, truth + np.array([2700, 1500])) < 0.03
 
 
 @pytest.mark.parametrize(("quarters", "degrees"), [(1, -90), (2, 180), (3, 90)])

@@ -30,9 +30,12 @@ def test_other_messages_pass(capfd: pytest.CaptureFixture[str]) -> None:
 
 
 def test_messages_before_an_error_pass(capfd: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(ValueError, match="broken"), _quiet_stderr():
+    def fail() -> None:
         os.write(2, b"F0000 the reason\n")
         raise ValueError("broken")
+
+    with pytest.raises(ValueError, match="broken"), _quiet_stderr():
+        fail()
     assert capfd.readouterr().err == "F0000 the reason\n"
 
 

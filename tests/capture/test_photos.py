@@ -56,7 +56,7 @@ def icc_profile(colorants: Array, name: str) -> bytes:
         b"rXYZ": xyz(colorants[:, 0]),
         b"gXYZ": xyz(colorants[:, 1]),
         b"bXYZ": xyz(colorants[:, 2]),
-        **{name: curve for name in (b"rTRC", b"gTRC", b"bTRC")},
+        **dict.fromkeys((b"rTRC", b"gTRC", b"bTRC"), curve),
     }
     table, body, start = struct.pack(">I", len(tags)), b"", 128 + 4 + 12 * len(tags)
     for tag, data in tags.items():

@@ -13,15 +13,15 @@ if TYPE_CHECKING:
     from mien.capture.source import View
 
 _THUMBNAIL = 32
-_SAME_BRIGHTNESS = 2.0
-_SAME_PLACE = 0.01
+_SAME_BRIGHTNESS = 1.0
+_SAME_PLACE = 0.02
 
 
 def same_photo(one: View, other: View) -> bool:
     """Equal pixels, or a copy that was saved again or resized.
 
-    Copies differ by under 2 grey levels in the mean of a 32x32 thumbnail, and in their landmarks
-    by under 1 % of the distance between the eyes. A burst of a living person differs by more.
+    Copies differ by some tenths of a grey level in the mean of a 32x32 thumbnail, and in their
+    landmarks by 1 % of the distance between the eyes, for the detector is no steadier.
     """
     first, second = one.photo.pixels, other.photo.pixels
     if first.shape == second.shape and np.array_equal(first, second):

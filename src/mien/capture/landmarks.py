@@ -37,7 +37,9 @@ class Landmarks:
             ("blendshapes", (52,)),
         ):
             object.__setattr__(self, name, frozen(check_array(name, getattr(self, name), shape)))
-        object.__setattr__(self, "R_cam_head", frozen(check_rotation("R_cam_head", self.R_cam_head)))
+        object.__setattr__(
+            self, "R_cam_head", frozen(check_rotation("R_cam_head", self.R_cam_head))
+        )
 
     @property
     def eye_distance_px(self) -> float:

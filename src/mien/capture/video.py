@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 VIDEO_SUFFIXES = frozenset((".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mts", ".3gp"))
 
 MAX_SAMPLES = 240
-_SAMPLE_SECONDS = 0.1
+# Just under a tenth, so that rounded times of a 10 Hz clip do not skip frames.
+_SAMPLE_SECONDS = 0.099
 _ANALYSIS_SIDE = 640
 _SHARPNESS_SIDE = 192
 _USUAL_RATE = 25
@@ -93,8 +94,9 @@ class Video:
             except av.FFmpegError as error:
                 reason = one_line(error.strerror or error)
                 self._note(f"the stream breaks after {count} frames ({reason})")
-            if count and stream.frames > count + 2:
-                self._note(f"{count} of the {stream.frames} frames that it states can be read")
+            stated = stream.frames or _frames_in(container, rate)
+            if 0 < count < 0.95 * stated - 2:
+                self._note(f"{count} of the {stated} frames that it states can be read")
         if not count:
             raise FileFormatError(self.path, "expected a video, found no frame that can be read")
 
@@ -102,11 +104,9 @@ class Video:
         """Number of frames (0: unknown) and seconds (None: unknown), as the file states them."""
         with self._opened() as container:
             stream = self._stream(container)
+            rate = float(stream.average_rate or _USUAL_RATE)
             seconds = container.duration / 1e6 if container.duration else None
-            count = stream.frames
-            if not count and seconds and stream.average_rate:
-                count = round(seconds * float(stream.average_rate))
-            return count, seconds
+            return stream.frames or _frames_in(container, rate), seconds
 
     def _note(self, note: str) -> None:
         if note not in self.notes:
@@ -132,6 +132,11 @@ class Video:
             limit = f"at most {MAX_PIXELS // 1_000_000} megapixels"
             raise FileFormatError(self.path, f"expected {limit} a frame, found {found}")
         return stream
+
+
+def _frames_in(container: InputContainer, rate: float) -> int:
+    """As the stated length tells; 0 when there is none."""
+    return round(container.duration / 1e6 * rate) if container.duration else 0
 
 
 def pick_frames(

@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mien.arrays import Array
+from mien.capture.annotations import AnnotationNames
+from mien.capture.source import load_capture
+from mien.errors import EstimationError, FileFormatError, InputError
+
+NAMES = AnnotationNames(frozenset({"chin"}), frozenset({"left_jaw"}))
+
+
+def put(path: Path, pixels: Array, **options: object) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(pixels).resize((300, 400)).save(path, **options)
+
+
+def annotate(photo: Path, point: list[float]) -> None:
+    folder = photo.parent / "annotations"
+    folder.mkdir(exist_ok=True)
+    (folder / f"{photo.stem}.json").write_text(json.dumps({"points": {"chin": point}}))
+
+
+@pytest.fixture
+def wall() -> Array:
+    return np.tile(np.linspace(0, 255, 400).astype(np.uint8)[:, None, None], (1, 300, 3))
+
+
+def test_folder_of_photos(tmp_path: Path, faces: dict[str, Array]) -> None:
+    put(tmp_path / "p10.png", faces["left"])
+    put(tmp_path / "p9.JPG", faces["right"], quality=95)
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / ".DS_Store").write_text("hidden")
+    annotate(tmp_path / "p10.png", [150, 320])
+    seen: list[tuple[int, int]] = []
+    capture = load_capture(
+        tmp_path, names=NAMES, progress=lambda done, total: seen.append((done, total))
+    )
+    assert capture.name == tmp_path.name
+    assert list(capture.expressions) == ["neutral"]
+    assert [view.photo.name for view in capture.views] == ["p9.JPG", "p10.png"]
+    assert all(view.landmarks is not None for view in capture.views)
+    assert capture.views[0].annotations is None
+    assert capture.views[1].annotations is not None
+    assert list(capture.views[1].annotations.points) == ["chin"]
+    assert capture.notes == ("not used, as they are no photos or lie beside photos: notes.txt",)
+    assert seen == [(1, 2), (2, 2)]
+
+
+def test_expression_folders(tmp_path: Path, faces: dict[str, Array]) -> None:
+    put(tmp_path / "joy" / "a.png", faces["left"])
+    put(tmp_path / "Neutral" / "a.png", faces["right"])
+    (tmp_path / "empty").mkdir()
+    capture = load_capture(tmp_path)
+    assert list(capture.expressions) == ["Neutral", "joy"]
+    assert [len(views) for views in capture.expressions.values()] == [1, 1]
+
+
+def test_one_photo(tmp_path: Path, faces: dict[str, Array]) -> None:
+    put(tmp_path / "me.png", faces["left"])
+    put(tmp_path / "you.png", faces["right"])
+    capture = load_capture(tmp_path / "me.png")
+    assert capture.name == "me"
+    assert [view.photo.name for view in capture.views] == ["me.png"]
+    assert not capture.notes
+
+
+def test_photos_are_reduced_with_their_annotations(tmp_path: Path, faces: dict[str, Array]) -> None:
+    put(tmp_path / "a.png", faces["left"])
+    annotate(tmp_path / "a.png", [150, 320])
+    (view,) = load_capture(tmp_path, names=NAMES, max_side=200).views
+    assert view.photo.size == (150, 200)
+    assert view.annotations is not None
+    np.testing.assert_allclose(view.annotations.points["chin"], [75, 160])
+
+
+def test_the_same_photo_twice(tmp_path: Path, faces: dict[str, Array]) -> None:
+    put(tmp_path / "a.png", faces["left"])
+    put(tmp_path / "b.png", faces["left"])
+    put(tmp_path / "c.jpg", faces["left"], quality=90)
+    Image.fromarray(faces["left"]).save(tmp_path / "d.png")
+    put(tmp_path / "e.png", faces["right"])
+    capture = load_capture(tmp_path)
+    assert [view.photo.name for view in capture.views] == ["a.png", "e.png"]
+    assert capture.notes == tuple(
+        f"{name}: left out: the same photo as a.png" for name in ("b.png", "c.jpg", "d.png")
+    )
+
+
+def test_photo_without_a_face_is_left_out(
+    tmp_path: Path, faces: dict[str, Array], wall: Array
+) -> None:
+    put(tmp_path / "a.png", faces["left"])
+    put(tmp_path / "b.png", wall)
+    capture = load_capture(tmp_path)
+    assert [view.photo.name for view in capture.views] == ["a.png"]
+    assert capture.notes[0].startswith("b.png: left out: no face found")
+
+
+def test_annotations_stand_in_for_the_detector(tmp_path: Path, wall: Array) -> None:
+    put(tmp_path / "profile.png", wall)
+    annotate(tmp_path / "profile.png", [10, 20])
+    capture = load_capture(tmp_path, names=NAMES)
+    assert capture.views[0].landmarks is None
+    assert capture.views[0].annotations is not None
+    assert capture.notes[0].endswith("; annotations only")
+
+
+def test_no_face_at_all(tmp_path: Path, wall: Array) -> None:
+    put(tmp_path / "b.png", wall)
+    message = r"no photo shows a face that can be used \(b\.png: left out: no face found"
+    with pytest.raises(EstimationError, match=message):
+        load_capture(tmp_path)
+
+
+def test_annotations_without_a_photo(tmp_path: Path, faces: dict[str, Array]) -> None:
+    put(tmp_path / "a.png", faces["left"])
+    annotate(tmp_path / "old_name.png", [1, 1])
+    capture = load_capture(tmp_path, names=NAMES)
+    assert capture.notes == ("annotations/old_name.json: there is no photo of that name",)
+
+
+def test_bad_annotations_end_the_load(tmp_path: Path, faces: dict[str, Array]) -> None:
+    put(tmp_path / "a.png", faces["left"])
+    annotate(tmp_path / "a.png", [301, 1])
+    with pytest.raises(FileFormatError, match=r"a\.json: points\.chin: expected a place within"):
+        load_capture(tmp_path, names=NAMES)
+
+
+def test_one_viewpoint_is_noted(tmp_path: Path, faces: dict[str, Array]) -> None:
+    put(tmp_path / "a.png", faces["left"])
+    put(tmp_path / "b.png", np.roll(faces["left"], 40, axis=1))
+    capture = load_capture(tmp_path)
+    assert len(capture.views) == 2
+    assert capture.notes[0].startswith("neutral: its 2 photos look from nearly one side (yaw spans")
+
+
+def test_nothing_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="expected photos in this folder or in folders within"):
+        load_capture(tmp_path)
+    with pytest.raises(
+        InputError, match="expected a photo, a video or a folder of photos, got not"
+    ):
+        load_capture(tmp_path / "absent")
+    (tmp_path / "a.jpg").write_text("no photo")
+    with pytest.raises(FileFormatError, match=r"a\.jpg: expected an image"):
+        load_capture(tmp_path)
+
+
+def test_video(shared: Path) -> None:
+    capture = load_capture(shared / "data/videos/single_face.mp4", frames=2)
+    assert capture.name == "single_face"
+    assert all(view.photo.stem.startswith("frame_") for view in capture.views)
+
+
+def test_seven_views_of_a_scan(shared: Path) -> None:
+    capture = load_capture(shared / "data/emily/renders_mentalray", max_side=800)
+    assert len(capture.views) == 7
+    assert [note for note in capture.notes if "scaled from" not in note] == []
