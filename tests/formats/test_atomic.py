@@ -105,6 +105,9 @@ class TestFile:
     def test_errors_of_other_files_pass_through(self, tmp_path: Path) -> None:
         with pytest.raises(FileNotFoundError), atomic_file(tmp_path / "result"):
             (tmp_path / "absent").read_text()
+        refused = PermissionError(errno.EACCES, "Permission denied", "/photos/front.jpg")
+        with pytest.raises(PermissionError), atomic_file(tmp_path / "result"):
+            raise refused
 
 
 class TestFolder:

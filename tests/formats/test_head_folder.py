@@ -239,6 +239,7 @@ def test_a_truncated_file_is_named(saved: Path, file: str, message: str, keep: f
         (lambda data: data.pop("subject"), "subject: missing"),
         (lambda data: data["expressions"].pop("neutral"), "expressions.neutral: missing"),
         (lambda data: data["face_units"].pop(), "unit_offsets: expected shape"),
+        (lambda data: data["parts"].append(3), "parts: expected names, found '3'"),
         (lambda data: data["textures"].update(atlas=3), "textures.atlas: expected text"),
         (
             lambda data: data["expressions"]["joy"]["cameras"][0].pop("focal_px"),
@@ -277,3 +278,30 @@ def test_pickled_arrays_are_never_read(saved: Path) -> None:
     np.savez(saved / "geometry.npz", **arrays)
     with pytest.raises(FileFormatError, match=r"geometry\.npz: not a readable .*allow_pickle"):
         load_head(saved)
+
+
+def test_the_documents_own_reader_works(saved: Path, small_head: Head) -> None:
+    """docs/head-folder.md shows how to read the folder with numpy alone; it must be true."""
+    text = (Path(__file__).parents[2] / "docs" / "head-folder.md").read_text("utf-8")
+    program = text.split("```python\n")[1].split("```")[0]
+    program = program.replace('open("HEAD/head.json", encoding="utf-8")', "opened")
+    program = program.replace("HEAD", saved.as_posix())
+    with (saved / "head.json").open(encoding="utf-8") as opened:
+        found: dict[str, Any] = {"opened": opened}
+        exec(program, found)
+    found["arrays"].close()
+    vertices = small_head.mesh.vertices + 0.5 * small_head.units[1]
+    np.testing.assert_allclose(found["vertices"], vertices, rtol=1e-6, atol=1e-5)
+    expected = small_head.views[0].camera.project(vertices)
+    np.testing.assert_allclose(found["pixels"], expected, rtol=1e-5)
+
+
+def test_the_document_shows_every_key(saved: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "head-folder.md").read_text("utf-8")
+    shown = json.loads(text.split("```json\n")[1].split("```")[0])
+    written = json.loads((saved / "head.json").read_text("utf-8"))
+    assert list(shown) == list(written)
+    assert list(shown["units"]) == list(written["units"])
+    shown, written = (data["expressions"]["neutral"] for data in (shown, written))
+    assert list(shown) == list(written)
+    assert list(shown["cameras"][0]) == list(written["cameras"][0])

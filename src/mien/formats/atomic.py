@@ -41,7 +41,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
     target = _target(path)
     if target.exists() and not target.is_file():
         raise InputError(path, "a file's name", "a folder" if target.is_dir() else "a device")
-    with _placing(path):
+    with _placing(path, target):
         target.parent.mkdir(parents=True, exist_ok=True)
         temporary = _beside(target, "tmp")
         try:
@@ -66,7 +66,7 @@ def atomic_folder(path: str | Path, *, replaces: Callable[[Path], bool]) -> Iter
     """
     check_folder_place(path, replaces=replaces)
     target = _target(path)
-    with _placing(path):
+    with _placing(path, target):
         target.parent.mkdir(parents=True, exist_ok=True)
         temporary = _beside(target, "tmp")
         try:
@@ -117,11 +117,18 @@ def _beside(target: Path, suffix: str) -> Path:
 
 
 @contextmanager
-def _placing(path: str | Path) -> Iterator[None]:
+def _placing(path: str | Path, target: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno not in _PLACE_ERRORS:
+        if error.errno not in _PLACE_ERRORS or not _concerns(target, error.filename):
             raise
-        reason = os.strerror(error.errno or 0)
+        reason = os.strerror(error.errno)
         raise InputError(path, "a place that can be written to", reason) from error
+
+
+def _concerns(target: Path, file: str | bytes | int | None) -> bool:
+    """Whether a failure at this file is one of writing the target: at it, above it or beside it."""
+    if not isinstance(file, str):
+        return True
+    return target.is_relative_to(file) or Path(file).is_relative_to(target.parent)

@@ -20,6 +20,7 @@ from mien.formats.head_json import (
     Json,
     check_version,
     get,
+    get_names,
     get_path,
     get_texts,
     head_to_json,
@@ -124,7 +125,7 @@ def _head_from(folder: Path, data: Json) -> Head:
         uvs=arrays["uvs"],
         uv_triangles=arrays["uv_triangles"],
         part=arrays["part"],
-        part_names=tuple(get(data, "parts", list)),
+        part_names=get_names(data, "parts"),
     )
     files = get(data, "textures", dict)
     return Head(
@@ -132,7 +133,7 @@ def _head_from(folder: Path, data: Json) -> Head:
         mesh=mesh,
         expressions=shapes,
         uncertainty_mm=arrays["uncertainty_mm"],
-        unit_names=tuple(get(data, "face_units", list)),
+        unit_names=get_names(data, "face_units"),
         unit_offsets=arrays["unit_offsets"],
         textures={name: load_image(folder / get_path(files, name, "textures")) for name in files},
         left_out=get_texts(data, "left_out"),

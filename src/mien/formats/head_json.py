@@ -88,6 +88,15 @@ def get_texts(data: Json, key: str, place: str = "") -> dict[str, str]:
     return {name: get(texts, name, str, key) for name in texts}
 
 
+def get_names(data: Json, key: str) -> tuple[str, ...]:
+    """data[key], a list of texts. Raises: Broken."""
+    names = get(data, key, list)
+    for name in names:
+        if not isinstance(name, str):
+            raise Broken(key, f"expected names, found {str(name)[:40]!r}")
+    return tuple(names)
+
+
 def get_path(data: Json, key: str, place: str = "") -> str:
     """data[key], a path that stays inside the folder. Raises: Broken."""
     path = get(data, key, str, place)

@@ -57,8 +57,8 @@ def encode_image(pixels: UInt8[Array, "h w c"], kind: str, *, quality: int = 95)
     if kind == "JPEG":
         image.save(stream, "JPEG", quality=quality, subsampling=0, optimize=True)
     else:
-        # Level 3 is three times as fast as the default and loses little on photographs.
-        image.save(stream, "PNG", compress_level=3)
+        # A fifth of the time that the default level takes, for a tenth more bytes of a photograph.
+        image.save(stream, "PNG", compress_level=1)
     return stream.getvalue()
 
 
