@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import mien.assets
 from mien.arrays import Array
 from mien.capture.annotations import AnnotationNames
 from mien.capture.source import load_capture
 from mien.errors import EstimationError, FileFormatError, InputError
 
+JAMES = Path(mien.assets.__file__).parent / "data" / "james"
 NAMES = AnnotationNames(frozenset({"chin"}), frozenset({"left_jaw"}))
 
 
@@ -57,7 +59,7 @@ def test_expression_folders(tmp_path: Path, faces: dict[str, Array]) -> None:
     put(tmp_path / "Neutral" / "a.png", faces["right"])
     (tmp_path / "empty").mkdir()
     capture = load_capture(tmp_path)
-    assert list(capture.expressions) == ["Neutral", "joy"]
+    assert list(capture.expressions) == ["neutral", "joy"]
     assert [len(views) for views in capture.expressions.values()] == [1, 1]
 
 
@@ -150,6 +152,12 @@ def test_nothing_there(tmp_path: Path) -> None:
     (tmp_path / "a.jpg").write_text("no photo")
     with pytest.raises(FileFormatError, match=r"a\.jpg: expected an image"):
         load_capture(tmp_path)
+
+
+def test_photos_that_ship_with_the_package() -> None:
+    capture = load_capture(JAMES)
+    assert [view.photo.name for view in capture.views] == ["photo_left.png", "photo_right.png"]
+    assert all(view.landmarks is not None for view in capture.views)
 
 
 def test_video(shared: Path) -> None:

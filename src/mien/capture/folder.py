@@ -22,11 +22,16 @@ def photo_files(source: Path) -> dict[str, list[Path]]:
     photos = _photos_in(source)
     if photos:
         return {NEUTRAL: photos}
-    folders = {folder.name: _photos_in(folder) for folder in _subfolders(source)}
+    folders = {_expression(folder): _photos_in(folder) for folder in _subfolders(source)}
     folders = {name: paths for name, paths in folders.items() if paths}
     if not folders:
         raise InputError(source, "photos in this folder or in folders within", "none")
-    return dict(sorted(folders.items(), key=lambda item: item[0].lower() != NEUTRAL))
+    return dict(sorted(folders.items(), key=lambda item: item[0] != NEUTRAL))
+
+
+def _expression(folder: Path) -> str:
+    """A folder's name; `Neutral` is `neutral`, as other stages look for that."""
+    return NEUTRAL if folder.name.lower() == NEUTRAL else folder.name
 
 
 def ignored_files(source: Path) -> list[str]:
