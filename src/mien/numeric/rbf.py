@@ -95,13 +95,10 @@ def fit_rbf(
     points, values, ridge = _merged(points, values, ridge)
     origin, axes = _affine_frame(points)
     terms = _affine_terms(points, origin, axes)
-    count, size = len(points), terms.shape[1]
-    system = np.zeros((count + size, count + size))
-    system[:count, :count] = _kernel_matrix(points, points, kernel, radius) + np.diag(ridge)
-    system[:count, count:], system[count:, :count] = terms, terms.T
-    right = np.concatenate([values, np.zeros((size, values.shape[1]))])
-    solution = _solve_symmetric(system, right)
-    return Rbf(points, solution[:count], origin, axes, solution[count:], kernel, radius)
+    matrix = _kernel_matrix(points, points, kernel, radius) + np.diag(ridge)
+    coefficients = _solve_within(matrix, terms, values)
+    affine = np.linalg.lstsq(terms, values - matrix @ coefficients, rcond=None)[0]
+    return Rbf(points, coefficients, origin, axes, affine, kernel, radius)
 
 
 def _check_radius(kernel: str, radius: float | None) -> float:
@@ -152,18 +149,24 @@ def _kernel_matrix(a: Array, b: Array, kernel: str, radius: float) -> Float[Arra
     return _KERNELS[kernel](cdist(a, b) / radius)
 
 
-def _solve_symmetric(system: Array, right: Array) -> Array:
+def _solve_within(matrix: Array, terms: Array, values: Array) -> Float[Array, "n d"]:
+    """Coefficients that meet the side conditions terms^T c = 0.
+
+    Written in a basis of what the conditions leave, the kernel matrix is positive definite.
+    """
     import warnings
 
     from scipy.linalg import LinAlgError, LinAlgWarning, solve
 
+    free = np.linalg.qr(terms, mode="complete")[0][:, terms.shape[1] :]
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", LinAlgWarning)
-            solution: Array = solve(system, right, assume_a="sym")
+            inner = solve(free.T @ matrix @ free, free.T @ values, assume_a="pos")
     except (LinAlgError, LinAlgWarning):
         raise EstimationError(
-            f"interpolation through {len(system)} equations is singular: points too close "
-            "together for this kernel and radius; add smoothing or choose a smaller radius"
+            f"interpolation through {len(matrix)} points is singular: some are too close together "
+            "for this kernel and radius; add smoothing or choose a smaller radius"
         ) from None
-    return solution
+    coefficients: Array = free @ inner
+    return coefficients
