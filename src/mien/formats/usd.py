@@ -171,8 +171,10 @@ def _define_blend_shapes(stage: Any, mesh: Any, targets: tuple[MorphTarget, ...]
     )
     binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
     binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
-    binding.CreateJointIndicesPrimvar(True, 1).Set(Vt.IntArray(1))
-    binding.CreateJointWeightsPrimvar(True, 1).Set(Vt.FloatArray([1.0]))
+    # One influence for all vertices would do by the specification; some readers want one for each.
+    count = len(mesh.GetPointsAttr().Get())
+    binding.CreateJointIndicesPrimvar(False, 1).Set(Vt.IntArray(count))
+    binding.CreateJointWeightsPrimvar(False, 1).Set(Vt.FloatArray(count, 1.0))
     binding.CreateBlendShapesAttr(names)
     shapes = [_define_blend_shape(stage, mesh, target) for target in targets]
     binding.CreateBlendShapeTargetsRel().SetTargets(shapes)
