@@ -23,6 +23,8 @@ from mien.numeric.rotation import rotation_from_vector, rotation_to_vector
 
 __all__ = ["Alternation", "alternate"]
 
+_EXACT_PX = 1e-11
+"""RMS reprojection error that is rounding."""
 _PATIENCE = 5
 """Sweeps over which progress is judged."""
 
@@ -125,7 +127,7 @@ def _bend(
 
 
 def _settled(costs: list[float], tolerance: float, observations: float) -> bool:
-    if costs[-1] <= 1e-18 * observations:
+    if costs[-1] <= _EXACT_PX**2 * observations:
         return True
     return len(costs) > _PATIENCE and costs[-1 - _PATIENCE] - costs[-1] <= tolerance * costs[-1]
 

@@ -33,8 +33,8 @@ __all__ = [
 _NEAREST_MM, _FARTHEST_MM = 200.0, 100_000.0
 _LEAST_DEPTH = 0.05
 """Floor of 1 + eta (r_z . m), so that a stray point behind a camera cannot turn the weights."""
-_ANCHOR = 1e-8
-"""Weight, relative to the data's, of a point's pull to its anchor: for what no ray settles."""
+_ANCHOR, _ANCHOR_SEEN_TWICE = 1e-8, 1e-13
+"""Weights, relative to the data's, of a point's pull to its anchor: for what no ray settles."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,9 @@ def step_points(
     a_weighted = w[..., None, None] * a
     normal = np.einsum("knic,knid->ncd", a_weighted, a, optimize=True)
     right = np.einsum("knic,kni->nc", a_weighted, b, optimize=True)
-    pull = _ANCHOR * (np.trace(normal, axis1=1, axis2=2) + 1e-12)
+    twice = np.count_nonzero(weights, axis=0) >= 2
+    pull = np.where(twice, _ANCHOR_SEEN_TWICE, _ANCHOR)
+    pull = pull * (np.trace(normal, axis1=1, axis2=2) + 1e-12)
     right -= np.einsum("ncd,nd->nc", normal, anchor)
     normal[:, range(3), range(3)] += pull[:, None]
     moved: Array = anchor + np.linalg.solve(normal, right[..., None])[..., 0]
