@@ -53,6 +53,7 @@ def orbit_camera(
     rise = float(np.abs(offsets[:, 1]).max())
     across = np.array([radius, rise * abs(np.cos(pitch)) + radius * abs(np.sin(pitch))])
     towards = radius * abs(np.cos(pitch)) + rise * abs(np.sin(pitch))
+    across = np.abs(_about_z(roll)[:2, :2]) @ across
     focal = max(width, height) / 2 / np.tan(fov / 2)
     free = (0.5 - margin) * np.array([width, height])
     distance = max(float((across * focal / free).max()), 1e-3) + towards

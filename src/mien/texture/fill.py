@@ -97,11 +97,10 @@ def make_backdrop(
 
     Args:
         coarse: the skin on the cylinder. blend: the photos on it.
-        regions: (V,) soft masks by name; what they leave, and every region of which the photos
-            show next to nothing, is filled from everything.
+        regions: (V,) soft masks by name; what they leave is filled from itself too, and so is,
+            with it, every region of which the photos show next to nothing.
     """
-    height, width = coarse.triangle_ids.shape
-    everything = fill_image(blend, fill, wrap=True)
+    shape = coarse.triangle_ids.shape
     images, masks = [], []
     left = np.ones(len(mesh.vertices))
     for name in (*FILLED_ALONE, *REGION_COLOURS):
@@ -109,15 +108,23 @@ def make_backdrop(
             continue
         mask = np.minimum(regions[name], left)
         if name in REGION_COLOURS:
-            image = np.broadcast_to(np.array(REGION_COLOURS[name], np.float32), (height, width, 3))
+            image = np.empty((*shape, 3), np.float32)
+            image[:] = REGION_COLOURS[name]
         else:
-            inside = np.zeros((height, width), np.float32)
-            inside[coarse.mask] = over_vertices(coarse, mesh, mask, coarse.mask)
-            own = replace(blend, confidence=blend.confidence * (inside > 0.5))
+            own = _within(blend, coarse, mesh, mask)
             if own.confidence.sum() < _FEWEST:
                 continue
             image = fill_image(own, fill, wrap=True)
         images.append(image)
         masks.append(mask)
         left = left - mask
-    return Backdrop(cylinder, np.stack([*images, everything]), np.stack([*masks, left]))
+    rest = _within(blend, coarse, mesh, left)
+    images.append(fill_image(rest if rest.confidence.any() else blend, fill, wrap=True))
+    return Backdrop(cylinder, np.stack(images), np.stack([*masks, left]))
+
+
+def _within(blend: Blend, surface: SurfaceMap, mesh: Mesh, mask: Float[Array, " v"]) -> Blend:
+    """The blend with nothing known outside a region, nor on its soft border."""
+    inside = np.zeros(surface.mask.shape, np.float32)
+    inside[surface.mask] = over_vertices(surface, mesh, mask, surface.mask)
+    return replace(blend, confidence=blend.confidence * (inside > 0.9))

@@ -46,9 +46,10 @@ def subject_mask(
     if not inside.any():
         return np.zeros(photo.shape[:2], bool)
     strip = max(2.0, _STRIP * float(np.sqrt(inside.sum())))
-    cut = _cut(small, inside, strip)
     trusted = _contrast(small, inside, strip) > least_contrast
-    mask = np.where(trusted, cut, inside).astype(np.float32)
+    mask = inside.astype(np.float32)
+    if trusted.any():
+        mask[trusted] = _cut(small, inside, strip)[trusted]
     full = cv2.resize(mask, photo.shape[1::-1], interpolation=cv2.INTER_LINEAR)
     person: Array = full > 0.5
     return person
@@ -74,16 +75,18 @@ def _cut(image: Array, inside: Array, strip: float) -> Bool[Array, "h w"]:
 
 
 def _contrast(image: Array, inside: Array, strip: float) -> Array:
-    """How unlike the colours inside and outside the outline are, around each pixel."""
+    """How unlike the colours inside and outside the outline are around each pixel; 0 where only
+    one of them is near."""
     import cv2
 
     deep = cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, 5)
     outer = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, 5)
     sigma = 2 * strip
-    means = []
+    means, near = [], np.ones(inside.shape, bool)
     for side in (deep > strip / 2, outer > strip):
         weight = cv2.GaussianBlur(side.astype(np.float32), (0, 0), sigma)
         sums = cv2.GaussianBlur(image.astype(np.float32) * side[..., None], (0, 0), sigma)
         means.append(sums / np.maximum(weight, 1e-4)[..., None])
-    contrast: Array = np.linalg.norm(means[0] - means[1], axis=2)
+        near &= weight > 0.02
+    contrast: Array = np.linalg.norm(means[0] - means[1], axis=2) * near
     return contrast

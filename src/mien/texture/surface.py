@@ -48,7 +48,7 @@ def surface_from(
 ) -> SurfaceMap:
     """The surface under texels whose triangles and places in them are known.
 
-    Raises: InputError: so few texels that no two neighbours lie on one triangle.
+    Raises: InputError: no two neighbouring texels.
     """
     points, normals = _points_and_normals(mesh, triangle_ids, barycentrics, np.s_[:])
     texel_mm = _texel_mm(points, triangle_ids)
@@ -121,10 +121,9 @@ def _points_and_normals(
 def _texel_mm(points: Array, triangle_ids: Array) -> float:
     steps = []
     for near, far in ((np.s_[::3, :-1], np.s_[::3, 1:]), (np.s_[:-1, ::3], np.s_[1:, ::3])):
-        # Texels of one triangle: between others there may be a fold or a seam.
-        same = (triangle_ids[near] == triangle_ids[far]) & (triangle_ids[near] >= 0)
-        steps.append(np.linalg.norm(points[far][same] - points[near][same], axis=1))
+        inside = (triangle_ids[near] >= 0) & (triangle_ids[far] >= 0)
+        steps.append(np.linalg.norm(points[far][inside] - points[near][inside], axis=1))
     lengths = np.concatenate(steps)
     if not len(lengths):
-        raise InputError("surface", "neighbouring texels on one triangle", "none")
+        raise InputError("surface", "neighbouring texels", "none")
     return float(np.median(lengths))

@@ -1,0 +1,83 @@
+"""A fitted mesh and feature points drawn over a photo."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mien.arrays import Array, Float, Int, UInt8, check_array, check_image
+from mien.camera import Camera
+from mien.errors import InputError
+from mien.mesh import Mesh
+from mien.render.shade import project_safely, rasterize_mesh, shown_parts
+
+# OpenCV draws at fractions of a pixel given as integers with this many bits behind the point.
+_SHIFT = 4
+
+
+def overlay_mesh(
+    photo: UInt8[Array, "h w 3"],
+    mesh: Mesh,
+    camera: Camera,
+    *,
+    parts: tuple[str, ...] | None = None,
+    colour: tuple[int, int, int] = (90, 220, 255),
+    opacity: float = 0.6,
+) -> UInt8[Array, "h w 3"]:
+    """The photo with the mesh's visible edges as thin lines over it.
+
+    Args:
+        parts: names of the parts to draw; by default those that pictures show.
+        colour: sRGB of the lines. opacity: from 0 to 1.
+    Raises: InputError: a photo of another size than the camera's.
+    """
+    import cv2
+
+    photo = check_image("photo", photo)
+    if photo.shape[:2] != (camera.height, camera.width):
+        expected = f"{camera.width}x{camera.height} px as its camera says"
+        raise InputError("photo", expected, f"{photo.shape[1]}x{photo.shape[0]}")
+    shown = mesh.submesh(mesh.triangles_of(*(shown_parts(mesh) if parts is None else parts)))
+    ends = project_safely(shown, camera)[_visible_edges(shown, camera)]
+    drawn = np.ascontiguousarray(photo)
+    if drawn is photo:
+        drawn = photo.copy()
+    cv2.polylines(drawn, list(_fixed_point(ends)), False, colour, 1, cv2.LINE_AA, _SHIFT)
+    mixed: Array = cv2.addWeighted(drawn, opacity, photo, 1 - opacity, 0)
+    return mixed
+
+
+def draw_points(
+    image: UInt8[Array, "h w 3"],
+    points: Float[Array, "n 2"],
+    *,
+    colour: tuple[int, int, int] = (255, 210, 60),
+    radius: float = 3.0,
+) -> UInt8[Array, "h w 3"]:
+    """The image with a dot at every point, (N, 2) px; points that are not finite are left out."""
+    import cv2
+
+    points = check_array("points", points, (None, 2), finite=False)
+    drawn = check_image("image", image).copy()
+    near = np.isfinite(points).all(axis=1) & (np.abs(points) < 1e5).all(axis=1)
+    for x, y in _fixed_point(points[near]):
+        size = round(radius * 2**_SHIFT)
+        cv2.circle(drawn, (int(x), int(y)), size, colour, -1, cv2.LINE_AA, _SHIFT)
+    return drawn
+
+
+def _visible_edges(mesh: Mesh, camera: Camera) -> Int[Array, "e 2"]:
+    """Vertex pairs, each once, of the triangles that the camera sees some of from in front."""
+    raster = rasterize_mesh(mesh, camera)
+    seen = np.unique(raster.triangle_ids[raster.mask])
+    facing = camera.center - mesh.vertices[mesh.triangles[seen, 0]]
+    seen = seen[np.einsum("fc,fc->f", facing, mesh.triangle_normals()[seen]) > 0]
+    triangles = mesh.triangles[seen]
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    unique: Array = np.unique(np.sort(edges, axis=1), axis=0)
+    return unique
+
+
+def _fixed_point(points: Array) -> Int[Array, "*n 2"]:
+    """OpenCV puts the first pixel's centre at 0, not at 0.5."""
+    fixed: Array = np.rint((points - 0.5) * 2**_SHIFT).astype(np.int32)
+    return fixed
