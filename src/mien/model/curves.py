@@ -13,6 +13,10 @@ from mien.errors import InputError
 __all__ = ["EpipolarPoints", "epipolar_lines", "match_curve", "resample_curve"]
 
 
+_SAME_PLACE = 1e-9
+"""Cameras nearer than this, relative to the head's distance, have no epipolar geometry."""
+
+
 def resample_curve(
     curve: Float[Array, "m 2"], fractions: Float[Array, " n"] | int
 ) -> Float[Array, "n 2"]:
@@ -29,10 +33,7 @@ def resample_curve(
         if fractions < 1:
             raise InputError("fractions", "one point or more", fractions)
         fractions = np.linspace(0, 1, fractions)
-    fractions = check_array("fractions", fractions, (None,))
-    if fractions.size and not (fractions.min() >= 0 and fractions.max() <= 1):
-        raise InputError("fractions", "numbers from 0 to 1", fractions)
-    return _at(curve, lengths, fractions)
+    return _at(curve, lengths, _checked_fractions(fractions, None))
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,9 @@ def match_curve(
     reference_points = check_array("reference_points", reference_points, (None, 2))
     count = len(reference_points)
     expected = np.linspace(0, 1, count) if fractions is None else fractions
-    expected = check_array("fractions", expected, (count,))
-    if (np.diff(expected) < 0).any() or not ((expected >= 0) & (expected <= 1)).all():
-        raise InputError("fractions", "increasing numbers from 0 to 1", expected)
+    expected = _checked_fractions(expected, count)
+    if (np.diff(expected) < 0).any():
+        raise InputError("fractions", "numbers that do not fall", "some that do")
     curve, lengths = _measured(curve)
     lines = epipolar_lines(reference_points, reference_camera, camera)
     candidates = []
@@ -98,10 +99,12 @@ def epipolar_lines(
     points: Float[Array, "n 2"], source: Camera, target: Camera
 ) -> Float[Array, "n 3"]:
     """Lines (a, b, c) with a x + b y + c = 0, a^2 + b^2 = 1, in the target's px, on which the
-    source's image points must appear. NaN where the ray shrinks to a point (the cameras coincide).
+    source's image points must appear. NaN where the cameras share their place.
     """
     to_target = target.R_cam_head @ source.R_cam_head.T
     shift = target.t_cam_head - to_target @ source.t_cam_head
+    if np.linalg.norm(shift) < _SAME_PLACE * np.linalg.norm(target.t_cam_head):
+        return np.full((len(points), 3), np.nan)
     rays = np.column_stack([(points - source.principal) / source.focal_px, np.ones(len(points))])
     normals = np.cross(shift, rays @ to_target.T)
     # A plane n . X = 0 through the camera meets the image in n . ((x - c) / f, 1) = 0.
@@ -114,6 +117,14 @@ def epipolar_lines(
     size = np.linalg.norm(lines[:, :2], axis=1, keepdims=True)
     unit: Array = np.divide(lines, size, out=np.full(lines.shape, np.nan), where=size > 0)
     return unit
+
+
+def _checked_fractions(fractions: object, count: int | None) -> Float[Array, " n"]:
+    checked = check_array("fractions", fractions, (count,))
+    out = np.abs(checked - 0.5) > 0.5 + 1e-9
+    if out.any():
+        raise InputError("fractions", "numbers from 0 to 1", checked[out][0])
+    return np.clip(checked, 0, 1)
 
 
 def _measured(curve: Array) -> tuple[Float[Array, "m 2"], Float[Array, " m"]]:
