@@ -43,8 +43,8 @@ def test_everything_is_in_the_picture(yaw: float, pitch: float, size: tuple[int,
     margin = 0.06 * np.array(size)
     assert (pixels >= margin - 1e-6).all()
     assert (pixels <= np.array(size) - margin + 1e-6).all()
-    # And it fills the picture reasonably.
-    assert (np.ptp(pixels, axis=0) / size).max() > 0.5
+    # And it fills the picture reasonably, though every yaw must fit at the same scale.
+    assert (np.ptp(pixels, axis=0) / size).max() > 0.4
 
 
 def test_a_turntable_goes_once_around_and_keeps_its_scale() -> None:

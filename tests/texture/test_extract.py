@@ -47,8 +47,8 @@ def psnr(one: Array, other: Array) -> float:
 def test_a_new_view_looks_as_it_should(
     mesh: Mesh, cameras: list[Camera], photos: list[Array], layout: str
 ) -> None:
-    # Photos at -50, 0 and 50 degrees, a new view at 25. What limits the match is resampling: a
-    # second bilinear lookup of waves of some 20 texels costs about a hundredth of their range.
+    # Photos at -50, 0 and 50 degrees, a new view at 25. Rounding to 8 bits three times (photo,
+    # texture, new view) alone leaves 54 dB; resampling waves of some 20 texels adds little.
     if layout == "atlas":
         surface, shown = atlas_surface(mesh, width=768, height=512), mesh
     else:
@@ -62,7 +62,7 @@ def test_a_new_view_looks_as_it_should(
     inner = truth[..., 3] == 255
     # Poles and rim are seen at a grazing angle by every photo and are filled, not photographed.
     inner[:45] = inner[-45:] = False
-    assert psnr(again[inner][:, :3], truth[inner][:, :3]) > 33
+    assert psnr(again[inner][:, :3], truth[inner][:, :3]) > 48
 
 
 @pytest.mark.parametrize("fill", ["pyramid", "grow"])
@@ -125,7 +125,7 @@ def test_the_other_side_is_taken_from_the_mirror(mesh: Mesh) -> None:
     right = camera_at(-60, mesh)
     again, truth = render(mesh, right, found.pixels), render(mesh, right, symmetric)
     inner = truth[60:-60, 110:-110]
-    assert psnr(again[60:-60, 110:-110, :3], inner[..., :3]) > 30
+    assert psnr(again[60:-60, 110:-110, :3], inner[..., :3]) > 48
 
 
 def test_parts_keep_to_themselves(mesh: Mesh) -> None:
