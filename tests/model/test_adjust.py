@@ -301,3 +301,46 @@ def test_refuses_bad_input(make_scene, change, message):
     }
     with pytest.raises(InputError, match=message):
         adjust_bundle(**{**given, **change})
+
+
+def test_agrees_with_scipy(make_scene, rng):
+    """The same cost as a general solver reaches by numeric derivatives."""
+    from scipy.optimize import least_squares
+
+    scene = make_scene(0, yaws=(-40, 0, 40), noise=1.0, count=13, hidden=False)
+    cameras, points = disturbed(scene, rng, 0.5)
+    result = adjust_bundle(
+        cameras, points, scene.image_points, shape_prior=prior_of(scene), tolerance=1e-13
+    )
+    principal = np.stack([camera.principal for camera in cameras])
+    data = BundleData(
+        image=scene.image_points - principal[:, None],
+        precision=np.ones((3, 13)),
+        group=np.arange(3),
+        log_focal_mean=np.zeros(3),
+        log_focal_precision=np.zeros(3),
+        shape=prior_of(scene),
+        loss=loss_named("linear"),
+    )
+    start = Bundle(
+        np.stack([camera.R_cam_head for camera in cameras]),
+        np.stack([camera.t_cam_head for camera in cameras]),
+        np.log([camera.focal_px for camera in cameras]),
+        points,
+        np.zeros(9),
+    )
+
+    def residuals(x):
+        bundle = move_bundle(start, (x[:30], x[30:].reshape(-1, 3)))
+        believed = scene.generic + np.tensordot(bundle.coefficients, scene.components, 1)
+        return np.concatenate(
+            [
+                bundle_residuals(bundle, data).ravel(),
+                ((bundle.points - believed) / 0.5).ravel(),
+                bundle.coefficients,
+            ]
+        )
+
+    best = least_squares(residuals, np.zeros(30 + 39), x_scale="jac", ftol=1e-12, xtol=1e-12)
+    assert result.cost == pytest.approx(best.cost, rel=1e-7)
+    assert result.cost <= best.cost * (1 + 1e-9)
