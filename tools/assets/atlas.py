@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.special import erf
 
 from mien.arrays import Array, Float, Int
 from tools.assets.head import PART_NAMES, HeadCut
@@ -37,6 +38,10 @@ _TILES: dict[str, tuple[Rectangle, ...]] = {
     "hair": ((0.64, 0.00, 1.00, 0.30),),
 }
 _MARGIN = 0.003
+# How the head's island is stretched so that the face gets more of it: centre and width of the
+# stretched band, in the island's box, and the gain.
+_WIDE = (0.5, 0.14, 1.8)
+_TALL = (0.27, 0.22, 1.0)
 
 
 def pack(source: MakeHuman, head: HeadCut) -> tuple[Float[Array, "u 2"], Int[Array, "q 4"]]:
@@ -50,13 +55,20 @@ def pack(source: MakeHuman, head: HeadCut) -> tuple[Float[Array, "u 2"], Int[Arr
         chosen = np.flatnonzero(head.quad_part == index)
         used, local = np.unique(head.uv_quads[chosen], return_inverse=True)
         local = local.reshape(-1, 4)
-        # The head lies on its side in hm08's atlas: turned, so that up is up.
-        placed = (
-            source.uvs[used][:, ::-1] * [1, -1] if part in ("skin", "hair") else source.uvs[used]
-        )
-        placed = placed.copy()
-        for island, tile in zip(_islands(placed, local), _TILES[part], strict=True):
-            placed[island] = _fit(placed[island], tile)
+        placed = source.uvs[used].copy()
+        islands = _islands(placed, local)
+        for rank, (island, tile) in enumerate(zip(islands, _TILES[part], strict=True)):
+            unit = _to_unit_square(placed[island])
+            if rank == 0 and part in ("skin", "hair"):
+                # The head lies on its side in hm08's atlas: turned, so that up is up.
+                unit = np.column_stack([unit[:, 1], 1 - unit[:, 0]])
+            if rank == 0 and part == "skin":
+                unit = np.column_stack(
+                    [_magnified(unit[:, 0], *_WIDE), _magnified(unit[:, 1], *_TALL)]
+                )
+            placed[island] = np.add(tile[:2], _MARGIN) + unit * (
+                np.subtract(tile[2:], tile[:2]) - 2 * _MARGIN
+            )
         uvs.append(placed)
         uv_quads[chosen] = local + count
         count += len(used)
@@ -72,7 +84,17 @@ def _islands(uvs: Float[Array, "u 2"], quads: Int[Array, "q 4"]) -> list[Int[Arr
     return sorted(islands, key=lambda i: (-round(float(np.prod(np.ptp(uvs[i], 0))), 5), i[0]))
 
 
-def _fit(uvs: Float[Array, "n 2"], tile: Rectangle) -> Float[Array, "n 2"]:
-    low, high = np.array(tile[:2]) + _MARGIN, np.array(tile[2:]) - _MARGIN
-    fitted: Array = low + (uvs - uvs.min(0)) / np.ptp(uvs, axis=0) * (high - low)
-    return fitted
+def _to_unit_square(uvs: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
+    unit: Array = (uvs - uvs.min(0)) / np.ptp(uvs, axis=0)
+    return unit
+
+
+def _magnified(x: Float[Array, " n"], centre: float, width: float, gain: float) -> Array:
+    """A smooth rising map of [0, 1] onto itself, 1 + gain times as steep about the centre."""
+    bump = gain * width * np.sqrt(np.pi) / 2
+
+    def integral(t: Array) -> Array:
+        return np.asarray(t + bump * erf((t - centre) / width))
+
+    ends = integral(np.array([0.0, 1.0]))
+    return np.asarray((integral(x) - ends[0]) / (ends[1] - ends[0]))

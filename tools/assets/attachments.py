@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 from scipy.optimize import linear_sum_assignment
 
 from mien.arrays import Array, Bool, Float, Int, UInt8
@@ -28,6 +29,11 @@ _IRISES = slice(468, 478)
 _SIZE = 900
 # A view counts only where the surface faces it by at least this cosine.
 _LEAST_COSINE = 0.3
+# On the half of the face that is turned away, only landmarks this near to the middle count: those
+# farther out lie on the silhouette, wherever that happens to be.
+_MIDDLE_MM = 25.0
+# A ray may miss the surface by this much.
+_LARGEST_GAP_MM = 3.0
 # Beyond this disagreement between views a landmark has no place on the mesh.
 _LARGEST_SPREAD_MM = 6.0
 
@@ -40,7 +46,7 @@ class Attachments:
         triangles: (478,) triangle under each landmark.
         barycentrics: (478, 3) place in it.
         attached: (478,) whether the place is to be trusted.
-        spread_mm: (478,) root mean square distance of the views' casts from the place.
+        spread_mm: (478,) weighted mean distance of the views' casts from the place.
         partners: (478,) each landmark's left-right partner.
     """
 
@@ -55,38 +61,63 @@ def attach(mesh: Mesh, paint: Paint, allowed: Bool[Array, " f"], model: bytes) -
     """Places the detector's landmarks on the mesh.
 
     Args:
+        mesh: as the detector shall see it.
         paint: colours of the head.
         allowed: (F,) triangles that a landmark may lie on: skin seen from outside, eyeballs.
         model: the face landmarker's model.
     """
-    frontal, casts, weights = [], [], []
+    casts, weights = [], []
     with _Detector(model) as detector:
+        camera = camera_at(0, size=_SIZE)
+        pictures = [shade(mesh, camera, paint, look) for look in LOOKS]
+        frontal = np.mean([detector.landmarks(picture) for picture in pictures], axis=0)
+        sideways = (frontal[:, 0] - _SIZE / 2) / camera.focal_px * camera.t_cam_head[2]
         for camera, image, yaw in _pictures(mesh, paint):
-            points = detector.landmarks(image)
-            if yaw == 0:
-                frontal.append(points)
-            cast, weight = _cast(mesh, camera, points)
+            cast, weight = _cast(mesh, camera, detector.landmarks(image), allowed)
             casts.append(cast)
-            weights.append(weight)
-    partners = _partners(np.mean(frontal, axis=0))
-    casts += [cast[partners] * [-1, 1, 1] for cast in casts]
-    weights += [weight[partners] for weight in weights]
-    stacked, shares = np.stack(casts), np.stack(weights)[..., None]
-    seen = shares.sum((0, 2)) > 0
-    mean = (stacked * shares).sum(0) / np.maximum(shares.sum(0), 1e-9)
-    on_eye = np.isin(mesh.part, [mesh.part_names.index(f"{s}_eyeball") for s in ("left", "right")])
-    iris = np.zeros(len(mean), bool)
-    iris[_IRISES] = True
-    triangles, barycentrics = np.empty(len(mean), np.int64), np.empty((len(mean), 3))
-    for of_iris in (False, True):
-        pick = np.flatnonzero(iris == of_iris)
-        on = np.flatnonzero(allowed & (on_eye == of_iris))
-        triangles[pick], barycentrics[pick] = closest_on_mesh(mean[pick], mesh, on)
+            weights.append(weight * (sideways * np.sign(yaw) > -_MIDDLE_MM))
+    partners = _partners(frontal)
+    stacked = np.stack(casts + [cast[partners] * [-1, 1, 1] for cast in casts])
+    shares = np.stack(weights + [weight[partners] for weight in weights])
+    middles = _geometric_medians(stacked, shares)
+    triangles, barycentrics = _snap(middles, mesh, allowed)
     places = (mesh.vertices[mesh.triangles[triangles]] * barycentrics[..., None]).sum(1)
-    squared = ((stacked - places) ** 2).sum(2, keepdims=True)
-    spread = np.sqrt((squared * shares).sum((0, 2)) / np.maximum(shares.sum((0, 2)), 1e-9))
-    attached = seen & (spread < _LARGEST_SPREAD_MM)
+    distances = np.linalg.norm(stacked - places, axis=2)
+    spread = (distances * shares).sum(0) / np.maximum(shares.sum(0), 1e-9)
+    attached = (shares.sum(0) > 0) & (spread < _LARGEST_SPREAD_MM)
     return Attachments(triangles, barycentrics, attached, spread, partners)
+
+
+def _geometric_medians(
+    points: Float[Array, "k n 3"], weights: Float[Array, "k n"], iterations: int = 30
+) -> Float[Array, "n 3"]:
+    """The place with the least weighted sum of distances to each landmark's casts (Weiszfeld).
+
+    A mean would be drawn aside by the views in which a landmark falls past the nose onto the
+    cheek behind.
+    """
+    shares = weights
+    for _ in range(iterations):
+        total = np.maximum(shares.sum(0), 1e-9)
+        middles: Array = (points * shares[..., None]).sum(0) / total[:, None]
+        shares = weights / np.maximum(np.linalg.norm(points - middles, axis=2), 0.05)
+    return middles
+
+
+def _snap(
+    points: Float[Array, "478 3"], mesh: Mesh, allowed: Bool[Array, " f"]
+) -> tuple[Int[Array, " 478"], Float[Array, "478 3"]]:
+    """The nearest places on the allowed skin, for the irises on the eyeballs."""
+    eyes = [mesh.part_names.index(f"{side}_eyeball") for side in ("left", "right")]
+    on_eye = np.isin(mesh.part, eyes)
+    of_iris = np.zeros(len(points), bool)
+    of_iris[_IRISES] = True
+    triangles, barycentrics = np.empty(len(points), np.int64), np.empty((len(points), 3))
+    for iris in (False, True):
+        pick = of_iris == iris
+        on = np.flatnonzero(allowed & (on_eye == iris))
+        triangles[pick], barycentrics[pick] = closest_on_mesh(points[pick], mesh, on)
+    return triangles, barycentrics
 
 
 class _Detector:
@@ -126,19 +157,26 @@ def _pictures(mesh: Mesh, paint: Paint) -> Iterator[tuple[Camera, UInt8[Array, "
 
 
 def _cast(
-    mesh: Mesh, camera: Camera, points: Float[Array, "n 2"]
+    mesh: Mesh, camera: Camera, points: Float[Array, "n 2"], allowed: Bool[Array, " f"]
 ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
-    """Where the points' rays meet the mesh, and how squarely (0 where they miss)."""
+    """Where the points' rays meet the mesh, and how squarely (0 where they miss).
+
+    A point in a gap (between the lips) or just past the silhouette is moved to the nearest pixel
+    that shows an allowed triangle from the front.
+    """
     raster = rasterize_mesh(mesh, camera)
-    columns, rows = np.clip(points.astype(int), 0, _SIZE - 1).T
-    ids, barycentrics = raster.triangle_ids[rows, columns], raster.barycentrics[rows, columns]
+    centres = mesh.vertices[mesh.triangles].mean(1)
+    towards = camera.center - centres
+    cosine = (mesh.triangle_normals() * towards).sum(1)
+    cosine /= np.linalg.norm(mesh.triangle_normals(), axis=1) * np.linalg.norm(towards, axis=1)
+    usable = raster.mask & (allowed & (cosine > _LEAST_COSINE))[raster.triangle_ids]
+    gap, (rows, columns) = distance_transform_edt(~usable, return_indices=True)
+    at = tuple(np.clip(points.astype(int), 0, _SIZE - 1).T[::-1])
+    ids = raster.triangle_ids[rows[at], columns[at]]
+    barycentrics = raster.barycentrics[rows[at], columns[at]]
     hits = (mesh.vertices[mesh.triangles[ids]] * barycentrics[..., None]).sum(1)
-    normals = mesh.triangle_normals()[ids]
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    towards = camera.center - hits
-    cosine = (normals * towards).sum(1) / np.linalg.norm(towards, axis=1)
-    weight = np.where((ids >= 0) & (cosine > _LEAST_COSINE), np.clip(cosine, 0, 1) ** 2, 0.0)
-    return hits, weight
+    near = gap[at] < _LARGEST_GAP_MM * camera.focal_px / camera.t_cam_head[2]
+    return hits, np.where(near, cosine[ids] ** 2, 0.0)
 
 
 def _partners(frontal: Float[Array, "n 2"]) -> Int[Array, " n"]:

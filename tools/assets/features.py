@@ -14,12 +14,12 @@ from mien.arrays import Array, Float, Int
 from tools.assets.head import HeadCut
 
 # Where the forehead's skin meets the hair, from the midline to the left temple.
-HAIRLINE = (983, 7679, 7678, 7017, 7016, 11838, 11839, 11843, 7040, 11842, 11848)
+HAIRLINE = (983, 7679, 7678, 7017, 7016, 11838, 11839, 11843, 11842, 11848)
 # The lower border of the jaw, from below the chin to the left ear lobe.
-JAW = (732, 7621, 7620, 7616, 7624, 7593, 10365, 7594, 7595, 7596, 7597, 7613, 7458, 7634)
+JAW = (5296, 11897, 11898, 11899, 7618, 7619, 10366, 7594, 7595, 7460, 7459, 7613, 7571, 12349)
 # Paired curves: from the midline outwards; number of vertices that the curve keeps.
 _PAIRED: dict[str, tuple[int, tuple[int, ...]]] = {
-    "eyebrow_upper": (5, (7006, 6997, 6980, 6979, 6981, 6982, 6987)),
+    "eyebrow_upper": (5, (6983, 6980, 6979, 6981, 6982, 6987)),
     "eyebrow_lower": (5, (6984, 6956, 6953, 6952, 6954, 6955, 6966)),
     "upper_eyelid": (
         7,
@@ -27,15 +27,19 @@ _PAIRED: dict[str, tuple[int, tuple[int, ...]]] = {
     ),
     "lower_eyelid": (
         7,
-        (6850, 6853, 6856, 6837, 11695, 6834, 6831, 6828, 6825)
-        + (6820, 6817, 6814, 11693, 6811, 6808, 6805),
+        (
+            *(6850, 6853, 6856, 6837, 11695, 6834, 6831, 6828),
+            *(6825, 6820, 6817, 6814, 11693, 6811, 6808, 6805),
+        ),
     ),
-    "nostril": (5, (7077, 7054, 7095, 7055, 7080, 7099, 11673, 11672, 7102, 7053)),
+    "nostril": (5, (7077, 7054, 7095, 7055, 7080, 7099, 11673, 11672, 7102, 7101, 7051)),
     "jaw": (7, JAW),
     "ear": (
         7,
-        (12353, 12012, 12015, 12021, 12016, 12022, 12018, 12040, 12039, 12061, 12051)
-        + (12166, 12052, 12053, 12050, 12049, 12027, 12340, 12005, 7634),
+        (
+            *(12353, 12012, 12015, 12021, 12016, 12022, 12018, 12040, 12039, 12061, 12051),
+            *(12166, 12052, 12053, 12050, 12049, 12027, 12340, 12005, 12358, 12349),
+        ),
     ),
 }
 # Single curves: their left half, from the midline outwards.
@@ -47,9 +51,9 @@ _SINGLE: dict[str, tuple[int, tuple[int, ...]]] = {
     "lower_lip_outer": (9, (492, 7241, 7235, 7166, 7165, 7164, 10371, 7186, 7185)),
     "upper_lip_inner": (
         7,
-        (474, 7229, 7228, 7227, 7226, 11964, 7225, 7179, 7178, 7190, 7249, 7185),
+        (520, 7267, 7268, 7261, 7262, 11962, 7263, 7179, 7178, 7190, 7185),
     ),
-    "lower_lip_inner": (7, (493, 7242, 7236, 7230, 7197, 7204, 7205, 7249, 7185)),
+    "lower_lip_inner": (7, (523, 7264, 7265, 7266, 7206, 7205, 7249, 7185)),
     "hairline": (9, HAIRLINE),
 }
 _NOSE_RIDGE_COUNT = 5
@@ -115,11 +119,21 @@ def _midline_ridge(head: HeadCut) -> list[int]:
 
 
 def _spaced(path: Sequence[int], vertices: Float[Array, "v 3"], count: int) -> tuple[int, ...]:
-    """The vertices of a path that divide its length most evenly, both ends included."""
+    """The vertices of a path, both ends included, that divide its length most evenly.
+
+    Of all choices that keep the order it is the one with the least sum of squared steps.
+    """
     steps = np.linalg.norm(np.diff(vertices[list(path)], axis=0), axis=1)
-    along = np.concatenate([[0], np.cumsum(steps)])
-    chosen = [0]
-    for wanted in np.linspace(0, along[-1], count)[1:-1]:
-        room = range(chosen[-1] + 1, len(path) - (count - 1 - len(chosen)))
-        chosen.append(min(room, key=lambda i: abs(along[i] - wanted)))
-    return tuple(int(path[i]) for i in (*chosen, len(path) - 1))
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    cost = along**2
+    cost[0] = np.inf
+    came_from = []
+    for _ in range(count - 2):
+        candidates = cost[:, None] + (along[None] - along[:, None]) ** 2
+        candidates[np.tril_indices(len(path))] = np.inf
+        came_from.append(candidates.argmin(0))
+        cost = candidates.min(0)
+    chosen = [len(path) - 1]
+    for previous in reversed(came_from):
+        chosen.append(int(previous[chosen[-1]]))
+    return tuple(int(path[i]) for i in (0, *reversed(chosen)))

@@ -15,22 +15,9 @@ from tools.assets.features import HAIRLINE
 from tools.assets.head import PART_NAMES, HeadCut
 from tools.assets.triangles import vertex_normals
 
-# hm08 vertices on the subject's left where hair ends: down the sideburn, around the ear, to the
-# nape. They carry on from the end of the hairline.
-_BEHIND_TEMPLE = (11848, 11809, 11846, 7575, 12001, 12351, 12366) + (
-    12362,
-    12364,
-    12353,
-    7570,
-    11973,
-    11985,
-    7648,
-    7642,
-    7697,
-    12158,
-    11879,
-    11885,
-)
+# Where hair ends behind the hairline: down the sideburn and around the ear (hm08 vertices on the
+# subject's left), then at one height over the nape.
+_BEHIND_TEMPLE = (7575, 12351, 12366, 12362, 12364, 7570, 11973, 7648, 7697, 12158, 11885)
 _NAPE_HEIGHT_MM = -78.0
 _SOFT_EDGE_MM = 12.0
 _LIFT_MM = (0.8, 7.0)
@@ -54,7 +41,8 @@ def scalp_mask(head: HeadCut) -> Float[Array, " v"]:
 def add_hair(head: HeadCut, scalp: Float[Array, " v"]) -> HeadCut:
     """The head with a cap of hair: copies of the scalp's vertices, lifted along their normals."""
     skin = head.quad_part == PART_NAMES.index("skin")
-    covered = np.flatnonzero(skin & (scalp[head.quads].min(1) >= 0.5))
+    # Three of four corners: the edge follows the hairline with fewer notches than with all four.
+    covered = np.flatnonzero(skin & ((scalp[head.quads] >= 0.5).sum(1) >= 3))
     below, local = np.unique(head.quads[covered], return_inverse=True)
     first = len(head.vertices)
     lift = np.interp(scalp[below], (0.5, 1.0), _LIFT_MM)

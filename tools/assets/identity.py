@@ -10,22 +10,27 @@ from mien.arrays import Array, Float
 from tools.assets.head import IPD_MM, HeadCut
 from tools.assets.makehuman import MakeHuman, Slider
 
-FOLDERS = (
-    "head",
-    "forehead",
-    "eyebrows",
-    "eyes",
-    "nose",
-    "cheek",
-    "mouth",
-    "chin",
-    "ears",
-    "neck",
-    "asym",
-)
-_SLIDER_SD = 0.3
-_ASYM_SD = 0.12
-_SIDE_SD = 0.05
+# How much the sliders of each folder vary (standard deviation; a slider's range is -1 to 1). Those
+# that reshape the whole skull act on tens of millimetres and are kept smaller.
+_SPREADS = {
+    "head": 0.15,
+    "forehead": 0.15,
+    "eyebrows": 0.3,
+    "eyes": 0.25,
+    "nose": 0.2,
+    "cheek": 0.3,
+    "mouth": 0.2,
+    "chin": 0.25,
+    "ears": 0.2,
+    "neck": 0.15,
+    "asym": 0.1,
+}
+# The distance between the eyes sets the scale of head space: kept to a few per cent.
+_EYE_DISTANCE = "eyes/l-eye-trans-out"
+_EYE_DISTANCE_SPREAD = 0.15
+# A slider without a left and a right that moves a feature sideways is an asymmetry too.
+_SIDEWAYS = ("nose/nose-trans-out", "mouth/mouth-trans-out", "head/head-trans-out")
+_SIDE_SPREAD = 0.05
 
 
 @dataclass(frozen=True)
@@ -55,14 +60,19 @@ def sample_heads(
     Returns: (count, V, 3), each aligned so that the eyes' centres stay where they are.
     """
     offsets = _macro_offsets(source, head, count, rng)
-    for folder in FOLDERS:
-        sd = _ASYM_SD if folder == "asym" else _SLIDER_SD
+    for folder, spread in _SPREADS.items():
         for group in source.sliders(folder):
-            shared = rng.normal(0, sd, count)
+            shared = rng.normal(0, _spread(group[0], spread), count)
             for slider in group:
-                value = shared if len(group) == 1 else shared + rng.normal(0, _SIDE_SD, count)
+                value = shared if len(group) == 1 else shared + rng.normal(0, _SIDE_SPREAD, count)
                 _add_slider(offsets, source, head, slider, np.clip(value, -1, 1))
     return _aligned(offsets, head)
+
+
+def _spread(slider: Slider, of_folder: float) -> float:
+    if slider.positive in _SIDEWAYS:
+        return _SPREADS["asym"]
+    return _EYE_DISTANCE_SPREAD if slider.positive == _EYE_DISTANCE else of_folder
 
 
 def _add_slider(

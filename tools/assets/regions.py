@@ -92,14 +92,16 @@ def build_regions(source: MakeHuman, head: HeadCut, scalp: Float[Array, " v"]) -
 
 
 def _below_jaw(head: HeadCut) -> Float[Array, " v"]:
-    """How far each vertex lies below the lower border of the jaw, 0 to 1."""
+    """How far each vertex lies below the lower border of the jaw or behind the ear, 0 to 1."""
     place = {int(vertex): index for index, vertex in enumerate(head.source)}
     jaw = head.vertices[[place[vertex] for vertex in JAW]]
     order = np.argsort(-jaw[:, 2], kind="stable")
     depth, height = -jaw[order, 2], jaw[order, 1]
     edge = np.interp(-head.vertices[:, 2], depth, height)
-    below: Array = smoothstep((edge - head.vertices[:, 1]) / 14 + 0.2)
-    return below
+    below = smoothstep((edge - head.vertices[:, 1]) / 14 + 0.2)
+    behind_ear = smoothstep((-70 - head.vertices[:, 2]) / 10)
+    neck: Array = np.maximum(below, behind_ear)
+    return neck
 
 
 def _nose(x: Array, y: Array, z: Array) -> Float[Array, " v"]:
