@@ -75,6 +75,7 @@ def adjust_bundle(
     shape_prior: ShapePrior | None = None,
     focal_prior: FocalPrior | None = None,
     focal_group: Int[Array, " k"] | None = None,
+    marginal: bool = True,
     max_iterations: int = 200,
     tolerance: float = 1e-10,
 ) -> Adjustment:
@@ -92,12 +93,15 @@ def adjust_bundle(
         loss: "linear", "huber" or "cauchy", bending beyond one sigma or so.
         shape_prior, focal_prior: as the classes say; absent means nothing known.
         focal_group: (K,) photos with the same number share their focal length.
+        marginal: with a shape prior, find the cameras of highest probability over all places
+            that the points may have, not of the most probable places (mien.model.evidence).
     Raises: InputError: shapes, NaN, sigma not above zero.
     Source: Triggs et al., Bundle adjustment, 2000: Schur complement over points.
     """
-    data, start = _pose_problem(
+    data, start = _bundle_problem(
         cameras, points, image_points, sigma_px, loss, shape_prior, focal_prior, focal_group
     )
+    data = replace(data, marginal=marginal)
 
     def linearize(bundle: Bundle) -> Callable[[float], tuple[tuple[Array, Array], float]]:
         system = linearize_bundle(bundle, data)
@@ -133,7 +137,7 @@ def adjust_bundle(
     )
 
 
-def _pose_problem(
+def _bundle_problem(
     cameras: Sequence[Camera],
     points: Array,
     image_points: Array,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int
+from mien.model.evidence import point_evidence
 from mien.numeric.robust import Loss
 from mien.numeric.rotation import cross_matrix, rotation_from_vector
 from mien.numeric.schur import BlockSystem
@@ -71,6 +72,7 @@ class BundleData:
         log_focal_mean: (G,) and log_focal_precision: (G,), 0 without a prior.
         shape: the shape prior or None.
         loss: of squared residuals over their variance.
+        marginal: integrate over the points' places (see mien.model.evidence); needs shape.
     """
 
     image: Float[Array, "k n 2"]
@@ -80,6 +82,7 @@ class BundleData:
     log_focal_precision: Float[Array, " g"]
     shape: ShapePrior | None
     loss: Loss
+    marginal: bool = False
 
 
 def bundle_residuals(bundle: Bundle, data: BundleData) -> Float[Array, "k n 2"]:
@@ -101,7 +104,7 @@ def bundle_cost(bundle: Bundle, data: BundleData) -> float:
     cost += (_focal_residuals(bundle, data) ** 2).sum() + (bundle.coefficients**2).sum()
     if data.shape is not None:
         cost += (_shape_residuals(bundle, data.shape) ** 2).sum()
-    return 0.5 * float(cost)
+    return 0.5 * float(cost) + _evidence(bundle, data)[0]
 
 
 def move_bundle(bundle: Bundle, step: tuple[Array, Array]) -> Bundle:
@@ -141,7 +144,10 @@ def bundle_jacobians(
 
 
 def linearize_bundle(bundle: Bundle, data: BundleData) -> BlockSystem:
-    """Normal equations in the step, the points as blocks. Robust terms by their weights."""
+    """Normal equations in the step, the points as blocks.
+
+    Robust terms enter by their weights, the evidence by its gradient.
+    """
     residuals = bundle_residuals(bundle, data)
     by_photo, by_point = bundle_jacobians(bundle, data)
     root = np.sqrt(data.loss((residuals**2).sum(axis=-1))[1])[..., None]
@@ -154,8 +160,10 @@ def linearize_bundle(bundle: Bundle, data: BundleData) -> BlockSystem:
     size = POSE_SIZE * photos + len(bundle.log_focal) + len(bundle.coefficients)
     common, gradient = np.zeros((size, size)), np.zeros(size)
     coupling = np.zeros((points, size, 3))
+    by_evidence = _evidence(bundle, data)[1]
     for k in range(photos):
         own = _columns(k, photos, data.group)
+        gradient[own] += by_evidence[k]
         flat = by_photo[k].reshape(-1, POSE_SIZE + 1)
         common[np.ix_(own, own)] += flat.T @ flat
         gradient[own] += flat.T @ residuals[k].ravel()
@@ -186,6 +194,16 @@ def _columns(photo: int, photos: int, group: Int[Array, " k"]) -> Int[Array, " 7
     pose = POSE_SIZE * photo + np.arange(POSE_SIZE)
     columns: Array = np.append(pose, POSE_SIZE * photos + group[photo])
     return columns
+
+
+def _evidence(bundle: Bundle, data: BundleData) -> tuple[float, Float[Array, "k 7"]]:
+    """Of the points' places, at the prior's mean, so that it is a matter of the cameras alone."""
+    if data.shape is None or not data.marginal:
+        return 0.0, np.zeros((len(bundle.R), POSE_SIZE + 1))
+    focal = np.exp(bundle.log_focal)[data.group]
+    return point_evidence(
+        bundle.R, bundle.t, focal, data.precision, data.shape.mean, data.shape.sigma
+    )
 
 
 def _focal_residuals(bundle: Bundle, data: BundleData) -> Float[Array, " g"]:
