@@ -183,7 +183,7 @@ def _partners(frontal: Float[Array, "n 2"]) -> Int[Array, " n"]:
     """Left-right partners: the pairing under which the frontal points mirror each other best."""
     mirrored = [_SIZE, 0] + frontal * [-1, 1]
     distances = np.linalg.norm(frontal[:, None] - mirrored[None], axis=2)
-    _, partners = linear_sum_assignment(distances + distances.T)
+    partners: Array = linear_sum_assignment(distances + distances.T)[1]
     return partners
 
 

@@ -64,19 +64,32 @@ def find_features(head: HeadCut) -> tuple[dict[str, int], dict[str, tuple[int, .
 
     Returns: vertex by name; vertices along each curve by name.
     """
-    place = {int(vertex): index for index, vertex in enumerate(head.source)}
     polylines: dict[str, tuple[int, ...]] = {}
     for name, (count, path) in _PAIRED.items():
-        left = _spaced([place[vertex] for vertex in path], head.vertices, count)
+        left = _spaced(head.from_hm08(path), head.vertices, count)
         polylines[f"left_{name}"] = left
         polylines[f"right_{name}"] = tuple(int(head.mirror[vertex]) for vertex in left)
     for name, (count, path) in _SINGLE.items():
-        half = _spaced([place[vertex] for vertex in path], head.vertices, count // 2 + 1)
+        half = _spaced(head.from_hm08(path), head.vertices, count // 2 + 1)
         right = tuple(int(head.mirror[vertex]) for vertex in half[:0:-1])
         polylines[name] = right + half
     ridge = _midline_ridge(head)
     polylines["nose_ridge"] = _spaced(ridge, head.vertices, _NOSE_RIDGE_COUNT)
     return _points(head, polylines), dict(sorted(polylines.items()))
+
+
+def brow_mask(head: HeadCut, polylines: dict[str, tuple[int, ...]]) -> Float[Array, " v"]:
+    """(V,) 1 on the skin within the eyebrows, falling to 0 beside them."""
+    mask = np.zeros(len(head.vertices))
+    for side in ("left", "right"):
+        upper, lower = (polylines[f"{side}_eyebrow_{edge}"] for edge in ("upper", "lower"))
+        middle = (head.vertices[list(upper)] + head.vertices[list(lower)]) / 2
+        steps = np.linspace(0, len(middle) - 1, 40)
+        line = np.column_stack([np.interp(steps, range(len(middle)), axis) for axis in middle.T])
+        distance = np.linalg.norm(head.vertices[:, None] - line[None], axis=2).min(1)
+        mask = np.maximum(mask, np.clip(1.6 - distance / 4, 0, 1))
+    mask[head.vertices_of("skin").max() + 1 :] = 0
+    return mask
 
 
 def _points(head: HeadCut, polylines: dict[str, tuple[int, ...]]) -> dict[str, int]:
@@ -104,7 +117,8 @@ def _front_midline(head: HeadCut) -> Int[Array, " n"]:
     skin = head.vertices_of("skin")
     own = skin[head.mirror[skin] == skin]
     front = own[head.vertices[own, 2] > 0]
-    return front[np.argsort(-head.vertices[front, 1], kind="stable")]
+    sorted_front: Array = front[np.argsort(-head.vertices[front, 1], kind="stable")]
+    return sorted_front
 
 
 def _midline_ridge(head: HeadCut) -> list[int]:

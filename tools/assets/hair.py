@@ -27,8 +27,7 @@ _SKULL_Z_MM = -75.0
 
 def scalp_mask(head: HeadCut) -> Float[Array, " v"]:
     """(V,) how much each vertex of the skin belongs to the haired part of the head, 0 to 1."""
-    place = {int(vertex): index for index, vertex in enumerate(head.source)}
-    border = head.vertices[[place[vertex] for vertex in HAIRLINE + _BEHIND_TEMPLE]]
+    border = head.vertices[head.from_hm08(HAIRLINE + _BEHIND_TEMPLE)]
     angles = np.concatenate([_around(border), [np.pi]])
     heights = np.concatenate([border[:, 1], [_NAPE_HEIGHT_MM]])
     order = np.argsort(angles, kind="stable")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,6 +58,13 @@ class HeadCut:
     def offsets_mm(self, offsets_dm: Float[Array, "m 3"]) -> Float[Array, "v 3"]:
         """A target's offsets on hm08 as offsets of the head's vertices."""
         return offsets_dm[self.source] * self.mm_per_dm
+
+    def from_hm08(self, vertices: Iterable[int]) -> list[int]:
+        """The head's vertices that were these hm08 vertices (not their copies in the hair)."""
+        places: dict[int, int] = {}
+        for index, vertex in enumerate(self.source.tolist()):
+            places.setdefault(vertex, index)
+        return [places[vertex] for vertex in vertices]
 
     def vertices_of(self, part: str) -> Int[Array, " n"]:
         """Vertices of a part."""

@@ -171,7 +171,7 @@ def principal_modes(
         count: number of modes kept.
     """
     centred = offsets - offsets.mean(0)
-    mirrored = centred[:, head.mirror] * np.float32([-1, 1, 1])
+    mirrored = centred[:, head.mirror] * np.array([-1, 1, 1], np.float32)
     halves = [_modes((centred + sign * mirrored) / 2, weights, count) for sign in (1, -1)]
     strengths = np.concatenate([half[1] for half in halves])
     components = np.concatenate([half[0] for half in halves])

@@ -40,9 +40,8 @@ def enclosed(head: HeadCut, ring: tuple[int, int]) -> Float[Array, " v"]:
         ring: two neighbouring hm08 vertices on the loop; its smaller side counts as the inside.
     """
     quads = head.quads[head.quad_part == PART_NAMES.index("skin")]
-    place = {int(vertex): index for index, vertex in enumerate(head.source)}
     topology = QuadTopology(quads)
-    first, second = (place[vertex] for vertex in ring)
+    first, second = head.from_hm08(ring)
     loop = topology.edge_loop(first, second)
     walls = {frozenset(pair) for pair in zip(loop, loop[1:] + loop[:1], strict=True)}
     sides = [topology.flood(quad, walls) for quad in topology.faces_of[frozenset((first, second))]]
@@ -93,8 +92,7 @@ def build_regions(source: MakeHuman, head: HeadCut, scalp: Float[Array, " v"]) -
 
 def _below_jaw(head: HeadCut) -> Float[Array, " v"]:
     """How far each vertex lies below the lower border of the jaw or behind the ear, 0 to 1."""
-    place = {int(vertex): index for index, vertex in enumerate(head.source)}
-    jaw = head.vertices[[place[vertex] for vertex in JAW]]
+    jaw = head.vertices[head.from_hm08(JAW)]
     order = np.argsort(-jaw[:, 2], kind="stable")
     depth, height = -jaw[order, 2], jaw[order, 1]
     edge = np.interp(-head.vertices[:, 2], depth, height)
