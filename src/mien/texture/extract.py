@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from mien.texture.atlas import fill_gutters
 from mien.texture.blend import Blend, blend_views
 from mien.texture.cylinder import cylinder_surface, fit_cylinder
 from mien.texture.equalize import estimate_gains
-from mien.texture.fill import FILLS, Backdrop, Fill, make_backdrop, mix, over
+from mien.texture.fill import FILLS, Backdrop, Fill, fill_part, make_backdrop, over
 from mien.texture.parts import SEE_THROUGH, SKIN, STYLES, PartStyle, fill_colour
 from mien.texture.subject import subject_mask
 from mien.texture.surface import SurfaceMap, cropped, mirrored, parts_of, restricted
@@ -147,7 +148,8 @@ def _texture_part(
     if job.fill == "none":
         return blend.colours, blend.coverage
     if style.fill != "surface":
-        return mix(blend.colours, fill_colour(style, blend), blend.confidence), blend.coverage
+        colours = fill_part(blend, fill_colour(style, blend), style.reach_mm / surface.texel_mm)
+        return colours, blend.coverage
     colours = blend.colours.copy()
     holes = surface.mask & (blend.confidence < 1)
     filled = backdrop.colours(surface, job.mesh, holes)
@@ -174,8 +176,9 @@ def _blend(job: _Job, surface: SurfaceMap, style: PartStyle) -> Blend:
 
     everything = list(range(len(views)))
     if style.photos == "best":
-        totals = [blended(surface, [k]).coverage.sum() for k in everything]
-        return blended(surface, [int(np.argmax(totals))])
+        single = [blended(surface, [k]) for k in everything]
+        single.sort(key=lambda blend: -float(blend.coverage.sum()))
+        return reduce(over, single)
     blend = blended(surface, everything)
     if job.mirror is None:
         return blend

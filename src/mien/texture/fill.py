@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from mien.arrays import Array, Bool, Float
+from mien.arrays import Array, Bool, Float, check_array
 from mien.mesh import Mesh
 from mien.numeric.pyramid import fill_growing, fill_pyramid
 from mien.numeric.sample import sample_bilinear
@@ -40,6 +40,21 @@ def mix(
     """Colours as far as they are certain, over what lies below (an image or one colour)."""
     mixed: Array = below + confidence[..., None] * (colours - below)
     return mixed.astype(np.float32)
+
+
+def fill_part(blend: Blend, colour: Float[Array, " 3"], reach: float) -> Float[Array, "h w 3"]:
+    """A part's holes filled with one colour, (H, W, 3) float32.
+
+    Args:
+        reach: texels over which what is seen gives way to the colour; 0 for only where it is not
+            certain.
+    """
+    mixed = mix(blend.colours, colour, blend.confidence)
+    if reach <= 1:
+        return mixed
+    # Known to this little everywhere, the colour is outweighed by what is seen until the pyramid's
+    # blocks are as wide as the reach.
+    return fill_pyramid(mixed, np.maximum(blend.confidence, 1 / reach**2))
 
 
 def over(blend: Blend, below: Blend) -> Blend:
@@ -99,6 +114,7 @@ def make_backdrop(
         coarse: the skin on the cylinder. blend: the photos on it.
         regions: (V,) soft masks by name; what they leave is filled from itself too, and so is,
             with it, every region of which the photos show next to nothing.
+    Raises: InputError: a mask that does not fit the mesh.
     """
     shape = coarse.triangle_ids.shape
     images, masks = [], []
@@ -106,7 +122,7 @@ def make_backdrop(
     for name in (*FILLED_ALONE, *REGION_COLOURS):
         if name not in regions:
             continue
-        mask = np.minimum(regions[name], left)
+        mask = np.minimum(check_array(name, regions[name], left.shape), left)
         if name in REGION_COLOURS:
             image = np.empty((*shape, 3), np.float32)
             image[:] = REGION_COLOURS[name]

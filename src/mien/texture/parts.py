@@ -16,32 +16,37 @@ class PartStyle:
     """How a part is textured.
 
     Attributes:
-        photos: "blend" all of them, take the "best" one (P02 sec. 5.2.4: the parts that move or
-            are half hidden come from one photo, where they are clearly seen), or "none".
+        photos: "blend" all of them, take the "best" one and the others only where it sees nothing
+            (P02 sec. 5.2.4: what moves or is half hidden comes from one photo), or "none".
         fill: what no photo shows is continued from the "surface" around it, takes the "white" of
             what is seen, or the "default" colour.
         default: 8-bit sRGB, where photos say nothing.
         feather_mm: at most; small parts need narrow ramps.
+        reach_mm: how far what is seen spreads into a fill of one colour.
     """
 
     photos: Literal["blend", "best", "none"]
     fill: Literal["surface", "white", "default"]
     default: tuple[int, int, int]
     feather_mm: float = np.inf
+    reach_mm: float = 0.0
 
 
 SKIN = PartStyle("blend", "surface", (176, 138, 118))
-_EYEBALL = PartStyle("best", "white", (214, 205, 198), feather_mm=1.0)
-_TEETH = PartStyle("best", "default", (206, 196, 178), feather_mm=1.0)
+_EYEBALL = PartStyle("best", "white", (196, 186, 178), feather_mm=1.0, reach_mm=3.0)
+_TEETH = PartStyle("best", "default", (78, 54, 48), feather_mm=1.0)
 
-# The defaults are plain: sclera, enamel, mucosa and lashes as photographs usually show them.
+# The defaults are plain: sclera, mucosa and lashes as photographs usually show them. Teeth and
+# tongue that no photo shows are behind closed lips: they get enamel and mucosa in deep shadow, for
+# P02 darkens them with the mouth's opening (sec. 5.2.4) and white ones would gleam through the
+# slightest gap between the lips.
 STYLES = {
     "skin": SKIN,
     "left_eyeball": _EYEBALL,
     "right_eyeball": _EYEBALL,
     "upper_teeth": _TEETH,
     "lower_teeth": _TEETH,
-    "tongue": PartStyle("best", "default", (150, 82, 80), feather_mm=1.0),
+    "tongue": PartStyle("best", "default", (96, 46, 44), feather_mm=1.0),
     "lashes": PartStyle("none", "default", (38, 30, 26)),
     "hair": PartStyle("blend", "surface", (60, 48, 40)),
 }
@@ -73,5 +78,9 @@ def _white(blend: Blend, default: Float[Array, " 3"]) -> Float[Array, " 3"]:
     # Lids and lashes at the rim are dark or reddish, the iris is dark, the glint is the brightest.
     low, high = np.percentile(brightness, [60, 90])
     chosen = (brightness >= low) & (brightness <= high) & (spread <= np.median(spread) + 1)
-    white: Array = np.median(seen[chosen], axis=0) if chosen.any() else default
+    if not chosen.any():
+        return default
+    tone = np.median(seen[chosen], axis=0)
+    # Some of it may be a lid's skin for all that: the light's brightness, but half of its hue.
+    white: Array = (tone + default * (tone.mean() / default.mean())) / 2
     return white

@@ -10,7 +10,9 @@ from mien.mesh import Mesh
 from mien.numeric.raster import rasterize
 
 # Longest side of the small image that is segmented, px.
-_SIDE = 320
+_SIDE = 240
+# Space around the mesh that is segmented with it, as a share of its size.
+_SPACE = 0.2
 # Width of the strip on both sides of the mesh's outline in which the cut may run, as a share of
 # the head's size in the photo.
 _STRIP = 0.06
@@ -33,26 +35,42 @@ def subject_mask(
     import cv2
 
     photo = check_image("photo", photo)
-    scale = min(1.0, _SIDE / max(photo.shape[:2]))
-    small_camera = camera.resized(scale)
-    size = (small_camera.width, small_camera.height)
-    small = cv2.resize(photo, size, interpolation=cv2.INTER_AREA)
-    inside = rasterize(
-        small_camera.project(mesh.vertices),
-        small_camera.to_camera(mesh.vertices)[:, 2],
-        mesh.triangles,
-        *size,
-    ).mask
-    if not inside.any():
+    outline = _outline(mesh, camera)
+    if outline is None:
         return np.zeros(photo.shape[:2], bool)
+    left, top, right, bottom = outline
+    scale = min(1.0, _SIDE / max(right - left, bottom - top))
+    size = (max(1, round((right - left) * scale)), max(1, round((bottom - top) * scale)))
+    small = cv2.resize(photo[top:bottom, left:right], size, interpolation=cv2.INTER_AREA)
+    pixels = (camera.project(mesh.vertices) - [left, top]) * scale
+    inside = rasterize(pixels, camera.to_camera(mesh.vertices)[:, 2], mesh.triangles, *size).mask
     strip = max(2.0, _STRIP * float(np.sqrt(inside.sum())))
     trusted = _contrast(small, inside, strip) > least_contrast
     mask = inside.astype(np.float32)
     if trusted.any():
         mask[trusted] = _cut(small, inside, strip)[trusted]
-    full = cv2.resize(mask, photo.shape[1::-1], interpolation=cv2.INTER_LINEAR)
-    person: Array = full > 0.5
+    person = np.zeros(photo.shape[:2], bool)
+    full = cv2.resize(mask, (right - left, bottom - top), interpolation=cv2.INTER_LINEAR)
+    person[top:bottom, left:right] = full > 0.5
     return person
+
+
+def _outline(mesh: Mesh, camera: Camera) -> tuple[int, int, int, int] | None:
+    """Left, top, right, bottom (px) of what is to be looked at: the mesh and some space around
+    it; None when it is not in the photo."""
+    used = np.unique(mesh.triangles)
+    in_camera = camera.to_camera(mesh.vertices[used])
+    if not (in_camera[:, 2] > 0).all():
+        return None
+    pixels = camera.project(mesh.vertices[used])
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    space = _SPACE * float((high - low).max())
+    left, top = (max(0, int(edge - space)) for edge in low)
+    right, bottom = (
+        min(limit, int(np.ceil(edge + space)))
+        for edge, limit in zip(high, (camera.width, camera.height), strict=True)
+    )
+    return (left, top, right, bottom) if right - left > 8 and bottom - top > 8 else None
 
 
 def _cut(image: Array, inside: Array, strip: float) -> Bool[Array, "h w"]:

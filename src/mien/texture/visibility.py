@@ -19,6 +19,7 @@ from mien.texture.surface import SurfaceMap
 # Two neighbouring pixels of the depth map that differ by more lie on different layers. One pixel
 # is a fraction of a millimetre wide: no surface that could be textured is so steep.
 _JUMP_MM = 3.0
+_STEEPEST = 2.75
 # What the camera sees of a surface steeper than this (80 degrees) is no use.
 _LEAST_CERTAINTY = 0.17
 
@@ -62,7 +63,8 @@ def prepare_view(
     texel_mm: float = 0.0,
     subject: Bool[Array, "h w"] | None = None,
     outline_mm: float = 3.0,
-    occlusion_mm: float = 1.0,
+    edge_mm: float = 1.0,
+    hidden_mm: float = 3.0,
 ) -> View:
     """The photo with its depth map (the Z-buffer of P02 sec. 5.2.1).
 
@@ -71,7 +73,8 @@ def prepare_view(
         texel_mm: the photo is halved while its pixels are much finer than this.
         subject: pixels that show the person; all when None.
         outline_mm: how far from the mesh's outline in the photo a pixel has to be to be used.
-        occlusion_mm: how far from an edge inside the outline, where one part hides another.
+        edge_mm: how far from an edge inside the outline, where one layer hides another.
+        hidden_mm: how far from such an edge on the side of the layer behind.
     Raises: InputError: no image, a camera of another size.
     """
     photo = check_image("photo", photo)
@@ -85,7 +88,7 @@ def prepare_view(
         subject = None if subject is None else subject[1::2, 1::2]
     pixels = camera.project(mesh.vertices)
     raster = rasterize(pixels, in_camera[:, 2], mesh.triangles, camera.width, camera.height)
-    usable = _away_from_edges(raster.depth, outline_mm / pixel_mm, occlusion_mm / pixel_mm)
+    usable = _trusted_pixels(raster.depth, pixel_mm, outline_mm, edge_mm, hidden_mm)
     if subject is not None:
         usable &= subject[: camera.height, : camera.width]
     return View(camera, photo, raster.depth, usable)
@@ -175,25 +178,43 @@ def _halved_camera(camera: Camera) -> Camera:
     )
 
 
-def _away_from_edges(depth: Array, outline_px: float, occlusion_px: float) -> Bool[Array, "h w"]:
-    """Pixels of the mesh that are further from its outline and from its inner edges than told."""
+def _trusted_pixels(
+    depth: Array, pixel_mm: float, outline_mm: float, edge_mm: float, hidden_mm: float
+) -> Bool[Array, "h w"]:
+    """Pixels where a small error of the shape puts nothing else.
+
+    Args:
+        outline_mm: from the mesh's outline. edge_mm: from an edge inside it, on either side.
+        hidden_mm: from such an edge on the side of what is hidden: there another layer's colours
+            would land on a surface far behind it.
+    """
     import cv2
 
     inside = np.isfinite(depth)
-    near = np.where(inside, depth, 0)
-    # Beyond the photo's border the mesh goes on: the border itself is no outline.
-    far = cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5) > outline_px
+    layers = np.where(inside, depth, np.float32(1e9))
     edges = np.zeros(depth.shape, bool)
     for axis in (0, 1):
-        jump = np.abs(np.diff(near, axis=axis)) > _JUMP_MM
+        jump = np.abs(np.diff(layers, axis=axis)) > _JUMP_MM
         ahead, behind = [slice(None)] * 2, [slice(None)] * 2
         ahead[axis], behind[axis] = slice(1, None), slice(None, -1)
         edges[tuple(ahead)] |= jump
         edges[tuple(behind)] |= jump
-    edges &= inside
-    clear = cv2.distanceTransform((~edges).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    away: Array = far & (clear > occlusion_px)
-    return away
+    trusted = _distance(inside) > outline_mm / pixel_mm
+    trusted &= _distance(~(edges & inside)) > edge_mm / pixel_mm
+    reach = round(hidden_mm / pixel_mm)
+    if reach > 0:
+        nearest = cv2.erode(layers, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+        # A steep surface alone gains this much within the reach.
+        trusted &= layers - nearest <= _JUMP_MM + _STEEPEST * hidden_mm
+    return trusted
+
+
+def _distance(mask: Bool[Array, "h w"]) -> Float[Array, "h w"]:
+    """To the nearest pixel outside the mask; the photo's border is none."""
+    import cv2
+
+    distance: Array = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    return distance
 
 
 @njit(cache=True, nogil=True)
