@@ -3,74 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
 from benchmarks.bound import within_shares
+from benchmarks.pose_errors import Errors, adjust, angle_error, focal_prior, measure, recover
 from benchmarks.scenes import FeatureHead, Scene, generic_features, long_lens_pair, random_scene
 from benchmarks.table import markdown_table, write_results
 from mien.arrays import Array, Float
 from mien.camera import Camera
 from mien.model.adjust import Adjustment, FocalPrior, adjust_bundle
 from mien.model.pose import PoseResult, recover_pose
-from mien.numeric.rotation import angle_between, rotation_from_vector
-from mien.numeric.similarity import estimate_similarity
+from mien.numeric.rotation import rotation_from_vector
 
 DEGREES, RELATIVE = 0.3, 0.05
 """What counts as recovered: rotation and focal length."""
-
-
-@dataclass(frozen=True)
-class Errors:
-    """Of one scene, after the similarity that best aligns the points seen twice is removed.
-
-    Attributes:
-        degrees: (K,) rotation. focal: (K,) relative. surface_mm: median over points seen twice.
-    """
-
-    degrees: Float[Array, " k"]
-    focal: Float[Array, " k"]
-    surface_mm: float
-
-
-def measure(cameras: Sequence[Camera | None], points: Array, scene: Scene) -> Errors:
-    """Errors of an answer in which no photo is left out."""
-    found = [camera for camera in cameras if camera is not None]
-    twice = np.isfinite(scene.image_points[..., 0]).sum(axis=0) >= 2
-    move = estimate_similarity(points[twice], scene.points[twice])
-    rotations = np.stack([camera.R_cam_head for camera in found]) @ move.rotation.T
-    true = np.stack([camera.R_cam_head for camera in scene.cameras])
-    focal = np.array([camera.focal_px for camera in found])
-    true_focal = np.array([camera.focal_px for camera in scene.cameras])
-    off = np.linalg.norm(move(points) - scene.points, axis=1)
-    return Errors(
-        np.rad2deg(angle_between(rotations, true)),
-        np.abs(focal / true_focal - 1),
-        float(np.median(off[twice])),
-    )
-
-
-def recover(scene: Scene, head: FeatureHead) -> PoseResult:
-    """P02's five steps from the generic head's points, nothing else known."""
-    return recover_pose(scene.image_points, head.points, scene.sizes)
-
-
-def adjust(scene: Scene, start: PoseResult, **priors: object) -> Adjustment:
-    """Bundle adjustment of what the five steps trusted."""
-    cameras = [camera for camera in start.cameras if camera is not None]
-    seen = np.where(start.trusted[..., None], scene.image_points, np.nan)
-    return adjust_bundle(cameras, start.points, seen, **priors)  # type: ignore[arg-type]
-
-
-def focal_prior(scene: Scene, rng: np.random.Generator, deviation: float) -> FocalPrior:
-    """Focal lengths known as well as this, as from a photo's EXIF."""
-    true = np.array([camera.focal_px for camera in scene.cameras])
-    believed = true * np.exp(deviation * rng.normal(size=len(true)))
-    return FocalPrior(believed, np.full(len(true), deviation))
-
 
 Family = Callable[[np.random.Generator, FeatureHead], Scene]
 FAMILIES: dict[str, Family] = {
@@ -230,14 +179,17 @@ def long_lenses(head: FeatureHead, scenes: int = 50) -> str:
             "generic head, not fitted": (start.cameras, head.points),
             "five steps": (start.cameras, start.points),
             "bundle adjustment": _answer(adjust(scene, start, sigma_px=1.5)),
-            "with identity prior": _answer(adjust(scene, start, **prior)),
-            "with identity prior and focal length to 20 %": _answer(
+            "with identity prior, points at their most probable places": _answer(
+                adjust(scene, start, **prior, marginal=False)
+            ),
+            "with identity prior, points integrated over": _answer(adjust(scene, start, **prior)),
+            "the same, and focal length known to 20 %": _answer(
                 adjust(scene, start, **prior, focal_prior=rough)
             ),
         }
         for name, (cameras, points) in answers.items():
             error = measure(cameras, points, scene)
-            turned = _relative_angle_error(cameras, scene)
+            turned = angle_error(cameras, scene)
             found.setdefault(name, []).append(
                 (turned, 100 * float(error.focal.mean()), error.surface_mm)
             )
@@ -262,13 +214,6 @@ def _long_lens_row(name: str, values: Float[Array, "s 3"]) -> list[object]:
 
 def _answer(result: Adjustment) -> tuple[tuple[Camera, ...], Array]:
     return result.cameras, result.points
-
-
-def _relative_angle_error(cameras: Sequence[Camera | None], scene: Scene) -> float:
-    """Degrees by which the angle between the first two views is wrong."""
-    first, second = (camera.R_cam_head for camera in cameras[:2] if camera is not None)
-    true = angle_between(scene.cameras[0].R_cam_head, scene.cameras[1].R_cam_head)
-    return float(np.rad2deg(np.abs(angle_between(first, second) - true)))
 
 
 def main() -> None:

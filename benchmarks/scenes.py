@@ -19,7 +19,6 @@ __all__ = [
     "generic_features",
     "long_lens_pair",
     "random_scene",
-    "synthetic_features",
 ]
 
 _IMAGE_SIZES = ((1000, 1300), (1200, 1600), (900, 1200))
@@ -91,29 +90,6 @@ def generic_features(*, more: int = 99, detail_mm: float = 1.0) -> FeatureHead:
         generic.identity.components[:, chosen].astype(float),
         detail_mm,
     )
-
-
-def synthetic_features(rng: np.random.Generator, count: int = 112) -> FeatureHead:
-    """A head-like set of points (ellipsoid with a nose) with smooth differences of 3 mm."""
-    from scipy.spatial.distance import cdist
-
-    axes = np.array([75.0, 110.0, 95.0])
-    directions = rng.normal(size=(20 * count, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    front = (directions[:, 2] > -0.15) & (np.abs(directions[:, 1]) < 0.8)
-    directions = directions[front][:count]
-    points = directions * axes
-    on_nose = np.exp(-((points[:, 0] / 14) ** 2) - ((points[:, 1] + 25) / 22) ** 2)
-    points[:, 2] += 22 * on_nose * (directions[:, 2] > 0)
-    normals = directions / axes
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    points -= (0, 20, 95)
-    values, vectors = np.linalg.eigh(9.0 * np.exp(-(cdist(points, points) ** 2) / (2 * 60.0**2)))
-    kept = 12
-    modes = (vectors * np.sqrt(np.maximum(values, 0)))[:, -kept:].T
-    components = np.einsum("cn,ij->cinj", modes, np.eye(3)).reshape(3 * kept, count, 3)
-    detail = float(np.sqrt(max(values[:-kept].sum(), 0) / count))
-    return FeatureHead(points, normals, components, max(detail, 0.3))
 
 
 def random_scene(
