@@ -6,13 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
-
+from mien.arrays import Array, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
-from mien.capture.source import NEUTRAL, Capture, View, load_capture
+from mien.capture.source import Capture, load_capture
 from mien.errors import EstimationError
 from mien.model.fit import Fit, FitOptions, fit_views
-from mien.model.head import ATLAS, CYLINDER, Expression, FittedView, Head
+from mien.model.head import ATLAS, CYLINDER, NEUTRAL, Expression, FittedView, Head
+from mien.texture.atlas import atlas_surface
+from mien.texture.cylinder import cylinder_surface, fit_cylinder
+from mien.texture.extract import extract_texture
+from mien.texture.fill import Fill
+from mien.texture.surface import SurfaceMap
 
 Progress = Callable[[str, int, int], None]
 """Told the stage, the steps done and their total."""
@@ -31,7 +35,7 @@ class BuildOptions:
     """
 
     fit: FitOptions = field(default_factory=FitOptions)
-    fill: str = "pyramid"
+    fill: Fill = "pyramid"
     texture_size: int = 2048
     face: int | None = None
     frames: int = 7
@@ -107,3 +111,37 @@ def _expression(name: str, fit: Fit) -> Expression:
         for photo, item in fit.photos.items()
     )
     return Expression(fit.vertices, views, ATLAS if name == NEUTRAL else name)
+
+
+def _textured(head: Head, capture: Capture, options: BuildOptions, tell: Progress) -> Head:
+    """The head with an atlas for every expression and neutral's cylinder (P02 sec. 5.2.2)."""
+    stage, total = "Extracting textures", len(head.expressions) + 1
+    tell(stage, 0, total)
+    textures: dict[str, UInt8[Array, "h w 3"]] = {}
+    side = options.texture_size
+    for name, expression in head.expressions.items():
+        mesh = head.expression_mesh(name)
+        atlas = atlas_surface(mesh, width=side, height=side)
+        textures[expression.texture] = _texture(head, capture, name, atlas, options.fill)
+        tell(stage, len(textures), total)
+    around = cylinder_surface(head.mesh, fit_cylinder(head.mesh), parts=("skin",))
+    textures[CYLINDER] = _texture(head, capture, NEUTRAL, around, options.fill)
+    tell(stage, total, total)
+    return replace(head, textures=textures)
+
+
+def _texture(
+    head: Head, capture: Capture, name: str, surface: SurfaceMap, fill: Fill
+) -> UInt8[Array, "h w 3"]:
+    generic = load_generic_head()
+    photos = {view.photo.name: view.photo.pixels for view in capture.expressions[name]}
+    views = head.expressions[name].views
+    return extract_texture(
+        head.expression_mesh(name),
+        [view.camera for view in views],
+        [photos[view.photo] for view in views],
+        surface=surface,
+        fill=fill,
+        mirror=generic.mirror,
+        regions=generic.regions,
+    ).pixels

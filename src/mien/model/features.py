@@ -23,7 +23,7 @@ LANDMARK_SIGMA_MM = 2.5
 """How far a detector's point slides over the skin between views (docs/pose-recovery.md)."""
 MIN_CONFIDENCE = 0.1
 """Landmarks below are not used: the surface turns away there."""
-WINS_WITHIN_MM = 15.0
+WINS_WITHIN_MM = 25.0
 """A hand-made mark silences the same photo's detector this far around it."""
 
 

@@ -7,22 +7,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mien.arrays import Array, Float
+from mien.arrays import Array, Bool, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.source import View
-from mien.model.adjust import FocalPrior, ShapePrior, adjust_bundle
-from mien.model.deform import deform_head, eye_centers, vertex_uncertainty
+from mien.model.adjust import Adjustment, FocalPrior, ShapePrior, adjust_bundle
+from mien.model.deform import eye_centers, vertex_uncertainty
 from mien.model.features import Features, gather_features, rematch_curves
 from mien.model.pose import recover_pose
 from mien.model.rays import intersect_rays
+from mien.model.shape import shape_from_features
 
 FOCAL_PRIOR_DIAGONALS = 1.7
 """Without EXIF: a focal length between a phone's (0.6 diagonals) and a cropped portrait's (3.5)."""
 FOCAL_PRIOR_DEVIATION = 0.6
 EXIF_DEVIATION = 0.05
-RESIDUAL_SIGMA_MM = 1.5
-"""How far a face departs from the identity basis, each axis (docs/generic-head.md)."""
+NAMED_SIGMA_MM = 5.0
+"""How far a named point lies off the identity basis, each axis: what a name means differs between
+faces and people who mark them, and these errors go together (docs/pose-recovery.md)."""
+ATTACHED_SIGMA_MM = 1.5
+"""The same for a landmark: the detector that finds it also attached it to the generic head."""
 PRIOR_DEVIATION_MM = 2.5
 """How far the generic head lies from a person's where no photo tells."""
 DISTRUST_SIGMAS = 5.0
@@ -151,7 +155,6 @@ class _Solution:
     cameras: tuple[Camera, ...]
     vertices: Float[Array, "v 3"]
     residuals: Float[Array, "k n 2"]
-    sigma_px: Float[Array, "k n"]
     deviation_mm: Float[Array, " n"]
     problems: dict[str, str]
 
@@ -171,87 +174,71 @@ def _solve(
     }
     keep = np.array([not text for text in start.problems])
     views = [view for view in views if view.photo.name not in problems]
-    features = features.of_photos(keep)
     cameras = tuple(camera for camera in start.cameras if camera is not None)
+    points = start.points[_shown(features, keep)]
+    features = features.of_photos(keep)
     vertices = generic.mesh.vertices
     for _ in range(options.rounds):
         if options.curves == "epipolar":
             features = rematch_curves(features, views, cameras, generic)
-        sigma_px = features.sigma_mm * _px_per_mm(cameras)[:, None]
         if options.adjust:
-            cameras, vertices, deviation = _adjust(
-                views, features, cameras, vertices, sigma_px, generic, options
-            )
+            adjusted = _adjust(views, features, cameras, points, generic, options)
+            cameras, points, deviation = adjusted.cameras, adjusted.points, adjusted.point_sd_mm
         else:
-            vertices, deviation = _intersect(features, cameras, vertices, generic, options)
+            points, deviation = _intersect(features, cameras, features.on(vertices))
+        vertices = shape_from_features(features, points, cameras, generic, kernel=options.kernel)
     projected = np.stack([camera.project(features.on(vertices)) for camera in cameras])
-    return _Solution(
-        views,
-        features,
-        cameras,
-        vertices,
-        projected - features.image_points,
-        sigma_px,
-        deviation,
-        problems,
-    )
+    residuals = projected - features.image_points
+    return _Solution(views, features, cameras, vertices, residuals, deviation, problems)
 
 
 def _adjust(
-    solution_views: Sequence[View],
+    views: Sequence[View],
     features: Features,
     cameras: tuple[Camera, ...],
-    vertices: Float[Array, "v 3"],
-    sigma_px: Float[Array, "k n"],
+    points: Float[Array, "n 3"],
     generic: GenericHead,
     options: FitOptions,
-) -> tuple[tuple[Camera, ...], Float[Array, "v 3"], Float[Array, " n"]]:
-    """Cameras, shape and the features' deviations of highest posterior."""
+) -> Adjustment:
+    """Cameras and points of highest posterior under the identity prior."""
+    by_hand = features.by_hand.any(axis=0)
     prior = ShapePrior(
         mean=features.on(generic.mesh.vertices),
         components=features.on(generic.identity.components),
-        sigma=np.full(len(features.names), RESIDUAL_SIGMA_MM),
+        sigma=np.where(by_hand, NAMED_SIGMA_MM, ATTACHED_SIGMA_MM),
     )
-    adjustment = adjust_bundle(
+    return adjust_bundle(
         cameras,
-        features.on(vertices),
+        points,
         features.image_points,
-        sigma_px=np.where(features.seen, sigma_px, 1.0),
+        sigma_px=np.where(features.seen, _sigma_px(features, cameras), 1.0),
         loss="cauchy",
         shape_prior=prior,
-        focal_prior=_focal_prior(solution_views),
+        focal_prior=_focal_prior(views),
         focal_group=np.zeros(len(cameras), int) if options.one_camera else None,
     )
-    person = generic.mesh.vertices + generic.identity.offsets(adjustment.coefficients)
-    shape = deform_head(
-        person,
-        features.on(person),
-        adjustment.points,
-        generic,
-        deviation_mm=adjustment.point_sd_mm,
-        kernel=options.kernel,
-    )
-    return adjustment.cameras, shape, adjustment.point_sd_mm
 
 
 def _intersect(
-    features: Features,
-    cameras: tuple[Camera, ...],
-    vertices: Float[Array, "v 3"],
-    generic: GenericHead,
-    options: FitOptions,
-) -> tuple[Float[Array, "v 3"], Float[Array, " n"]]:
-    """P02 sec. 5.1.3: cameras fixed, features where their rays meet, the rest follows."""
-    places = features.on(vertices)
+    features: Features, cameras: tuple[Camera, ...], places: Float[Array, "n 3"]
+) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
+    """P02 sec. 5.1.3: the features where their rays meet, and how far those miss each other."""
     weights = 1 / features.sigma_mm**2
     rays = intersect_rays(cameras, features.image_points, weights=weights, current=places)
-    shape = deform_head(vertices, places, rays.points, generic, kernel=options.kernel)
-    return shape, np.where(rays.solved, rays.residual_mm, PRIOR_DEVIATION_MM)
+    return rays.points, np.where(rays.solved, rays.residual_mm, PRIOR_DEVIATION_MM)
 
 
-def _px_per_mm(cameras: Sequence[Camera]) -> Float[Array, " k"]:
-    """(K,) how many px a millimetre at the head's distance covers."""
-    return np.array([camera.focal_px / camera.t_cam_head[2] for camera in cameras])
+def _shown(features: Features, keep: Bool[Array, " k"]) -> Bool[Array, " n"]:
+    """(N,) features that one of these photos shows."""
+    shown: Array = features.seen[keep].any(axis=0)
+    return shown
+
+
+def _sigma_px(features: Features, cameras: Sequence[Camera]) -> Float[Array, "k n"]:
+    """(K, N) px: the observations' deviations as the photos show them; inf where unseen."""
+    px_per_mm = [camera.focal_px / camera.t_cam_head[2] for camera in cameras]
+    sigma: Array = features.sigma_mm * np.array(px_per_mm)[:, None]
+    return sigma
 
 
 def _focal_prior(views: Sequence[View]) -> FocalPrior:
@@ -270,7 +257,9 @@ def _misfit(solution: _Solution) -> dict[str, str] | None:
     """The photo that fits worst, and why, if it fits so badly that it shows something else."""
     if len(solution.cameras) < 2:
         return None
-    off = np.linalg.norm(solution.residuals, axis=2) / solution.sigma_px
+    off = np.linalg.norm(solution.residuals, axis=2) / _sigma_px(
+        solution.features, solution.cameras
+    )
     typical = np.array([np.sqrt(np.median(row[np.isfinite(row)] ** 2)) for row in off])
     worst = int(typical.argmax())
     others = float(np.median(np.delete(typical, worst)))
@@ -300,10 +289,11 @@ def _in_head_space(
 def _marks(solution: _Solution, k: int) -> tuple[Mark, ...]:
     """Every mark of photo k with its residual; far off its expected error it is distrusted."""
     features = solution.features
+    sigma_px = _sigma_px(features, solution.cameras)[k]
     marks = []
     for n in np.flatnonzero(features.seen[k]):
         residual = solution.residuals[k, n]
-        off = float(np.hypot(*residual)) / solution.sigma_px[k, n]
+        off = float(np.hypot(*residual)) / sigma_px[n]
         verdict = f"{off:.0f} times its expected error off" if off > DISTRUST_SIGMAS else ""
         marks.append(
             Mark(
