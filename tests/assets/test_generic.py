@@ -16,17 +16,15 @@ from mien.errors import FileFormatError, InputError
 from mien.numeric.raster import rasterize
 
 FLIP = np.array([-1.0, 1.0, 1.0])
-PARTS = tuple(
-    [
-        "skin",
-        "left_eyeball",
-        "right_eyeball",
-        "upper_teeth",
-        "lower_teeth",
-        "tongue",
-        "lashes",
-        "hair",
-    ]
+PARTS = (
+    "skin",
+    "left_eyeball",
+    "right_eyeball",
+    "upper_teeth",
+    "lower_teeth",
+    "tongue",
+    "lashes",
+    "hair",
 )
 POLYLINE_LENGTHS = {
     "eyebrow_upper": 5,
@@ -230,7 +228,7 @@ class TestRegions:
 
     def test_the_coarse_regions_share_out_the_skin(self, head: GenericHead) -> None:
         names = ("face", "neck", "scalp", "left_ear", "right_ear", "mouth_cavity", "eye_socket")
-        total = sum(head.regions[name] for name in names)
+        total = np.sum([head.regions[name] for name in names], axis=0)
         assert_allclose(total[part_vertices(head, "skin")], 1, atol=1e-5)
 
     @pytest.mark.parametrize(
