@@ -81,17 +81,20 @@ def _areas(points: Array, triangles: Array) -> Float[Array, " f"]:
 
 
 @njit(cache=True, nogil=True)
-def _read(flat: Array, start: int, width: int, height: int, u: float, v: float, c: int) -> float:
-    """Bilinear lookup of one channel; u and v from 0 to 1, v downwards, u goes around."""
+def _add_level(
+    flat: Array, start: int, width: int, height: int, u: float, v: float, share: float, out: Array
+) -> None:
+    """Add share x one level's colour at (u, v) to out; v points down here, u goes around."""
     x, y = u * width - 0.5, min(max(v * height - 0.5, 0.0), height - 1.0)
     x0, y0 = int(np.floor(x)), int(y)
     fx, fy = x - x0, y - y0
     left, right = x0 % width, (x0 + 1) % width
     above, below = start + y0 * width, start + min(y0 + 1, height - 1) * width
-    upper = (1.0 - fx) * flat[above + left, c] + fx * flat[above + right, c]
-    lower = (1.0 - fx) * flat[below + left, c] + fx * flat[below + right, c]
-    value: float = (1.0 - fy) * upper + fy * lower
-    return value
+    w00, w01 = share * (1.0 - fy) * (1.0 - fx), share * (1.0 - fy) * fx
+    w10, w11 = share * fy * (1.0 - fx), share * fy * fx
+    for c in range(3):
+        upper = w00 * flat[above + left, c] + w01 * flat[above + right, c]
+        out[c] += upper + w10 * flat[below + left, c] + w11 * flat[below + right, c]
 
 
 @njit(cache=True, nogil=True)
@@ -124,7 +127,9 @@ def _texture_rows(
             level = min(max(level, 0.0), float(last))
             fine = int(level)
             coarse, share = min(fine + 1, last), level - fine
-            for c in range(3):
-                near = _read(flat, starts[fine], sizes[fine, 1], sizes[fine, 0], u, v, c)
-                far = _read(flat, starts[coarse], sizes[coarse, 1], sizes[coarse, 0], u, v, c)
-                out[row, col, c] = (1.0 - share) * near + share * far
+            pixel = out[row, col]
+            width, height = sizes[fine, 1], sizes[fine, 0]
+            _add_level(flat, starts[fine], width, height, u, v, 1.0 - share, pixel)
+            if share > 0.0:
+                width, height = sizes[coarse, 1], sizes[coarse, 0]
+                _add_level(flat, starts[coarse], width, height, u, v, share, pixel)

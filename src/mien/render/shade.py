@@ -141,12 +141,15 @@ def _enlarged(camera: Camera, factor: int) -> Camera:
 
 def _reduced(colours: Array, mask: Array, factor: int) -> UInt8[Array, "h w 4"]:
     """Means over factor x factor pixels; colours are those of the head alone."""
-    height, width = mask.shape[0] // factor, mask.shape[1] // factor
-    blocks = (height, factor, width, factor)
-    covered = mask.reshape(blocks).sum(axis=(1, 3), dtype=np.float32)
-    inside = np.where(mask[..., None], colours, 0).astype(np.float32)
-    sums = inside.reshape(*blocks, 3).sum(axis=(1, 3))
-    image = np.empty((height, width, 4), np.float32)
-    image[..., :3] = sums / np.maximum(covered, 1)[..., None]
-    image[..., 3] = covered * (255 / factor**2)
+    import cv2
+
+    size = (mask.shape[1] // factor, mask.shape[0] // factor)
+    covered = mask.astype(np.float32)
+    inside = np.ascontiguousarray(colours, np.float32) * covered[..., None]
+    if factor > 1:
+        covered = cv2.resize(covered, size, interpolation=cv2.INTER_AREA)
+        inside = cv2.resize(inside, size, interpolation=cv2.INTER_AREA)
+        inside /= np.maximum(covered, 0.5 / factor**2)[..., None]
+    image = np.empty((size[1], size[0], 4), np.float32)
+    image[..., :3], image[..., 3] = inside, covered * 255
     return np.clip(np.rint(image), 0, 255).astype(np.uint8)
