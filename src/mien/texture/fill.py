@@ -52,9 +52,9 @@ def fill_part(blend: Blend, colour: Float[Array, " 3"], reach: float) -> Float[A
     mixed = mix(blend.colours, colour, blend.confidence)
     if reach <= 1:
         return mixed
-    # Known to this little everywhere, the colour is outweighed by what is seen until the pyramid's
-    # blocks are as wide as the reach.
-    return fill_pyramid(mixed, np.maximum(blend.confidence, 1 / reach**2))
+    # Known so little, the colour only counts where it fills blocks of the pyramid that are wider
+    # than twice the reach.
+    return fill_pyramid(mixed, np.maximum(blend.confidence, 0.25 / reach**2))
 
 
 def over(blend: Blend, below: Blend) -> Blend:

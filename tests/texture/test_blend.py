@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mien.texture.atlas import atlas_surface
+from mien.texture.blend import blend_views
+from mien.texture.visibility import prepare_view, sight
+from shapes import camera_at, ellipsoid
+
+
+@pytest.mark.parametrize("power", [1.0, 3.0])
+def test_colours_are_the_convex_combination_by_visibility_times_certainty(power: float) -> None:
+    mesh = ellipsoid()
+    surface = atlas_surface(mesh, width=80, height=60)
+    tones = np.array([[200.0, 100, 50], [40, 160, 240], [90, 90, 90]])
+    photos = [np.full((320, 320, 3), tone, np.uint8) for tone in tones]
+    yaws = (-40, 0, 60)
+    views = [
+        prepare_view(mesh, camera_at(yaw, mesh), photo)
+        for yaw, photo in zip(yaws, photos, strict=True)
+    ]
+    gains = np.array([[1, 1, 1], [1.1, 1, 0.9], [1, 1, 1]])
+    blend = blend_views(surface, views, gains, feather_mm=20, certainty_power=power)
+    seen = [sight(surface, view, feather_mm=20) for view in views]
+    weights = np.stack([s.feathered * s.certainty**power for s in seen])  # g_k = F_k P_k
+    np.testing.assert_allclose(blend.coverage, weights.sum(axis=0), rtol=1e-4, atol=1e-6)
+    lit = blend.coverage > 1e-3
+    shares = weights[:, lit] / weights[:, lit].sum(axis=0)
+    np.testing.assert_allclose(shares.sum(axis=0), 1, rtol=1e-5)
+    expected = np.einsum("kn,kc->nc", shares, tones * gains)
+    np.testing.assert_allclose(blend.colours[lit], expected, rtol=1e-3)
+    assert not blend.colours[blend.coverage == 0].any()
+
+
+def test_grazing_views_are_not_trusted_by_themselves() -> None:
+    mesh = ellipsoid()
+    surface = atlas_surface(mesh, width=80, height=60)
+    view = prepare_view(mesh, camera_at(0, mesh), np.full((320, 320, 3), 99, np.uint8))
+    blend = blend_views(surface, [view], feather_mm=0.1, certainty_power=1)
+    certainty = sight(surface, view, feather_mm=0.1).certainty
+    assert not blend.confidence[certainty < 0.17].any()
+    np.testing.assert_allclose(blend.confidence[certainty > 0.4], 1)
+    # Where the outline's margin and the ramp of the visibility leave it alone.
+    between = (certainty > 0.29) & (certainty < 0.33) & (blend.coverage > 0.99 * certainty)
+    assert between.sum() > 20
+    np.testing.assert_allclose(
+        blend.confidence[between], (certainty[between] - 0.17) / 0.17, atol=1e-5
+    )
