@@ -44,7 +44,7 @@ def test_a_part_keeps_what_is_seen_and_turns_into_its_own_colour_further_away() 
     confidence[40:56, 40:56] = 1
     filled = fill_part(uniform((100, 50, 20), confidence), np.full(3, 200.0), 10)
     np.testing.assert_allclose(filled[48, 48], [100, 50, 20], atol=1e-4)
-    assert abs(filled[48, 58, 0] - 100) < 35
+    assert abs(filled[48, 58, 0] - 100) < 50
     assert abs(filled[48, 90, 0] - 200) < 10
     flat = fill_part(uniform((100, 50, 20), confidence), np.full(3, 200.0), 0)
     np.testing.assert_allclose(flat[48, 57], 200)
