@@ -6,20 +6,28 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from mien.arrays import Array, UInt8
+from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
+from mien.capture.annotations import save_annotations
 from mien.capture.source import Capture, load_capture
 from mien.errors import EstimationError
+from mien.formats.atomic import atomic_folder
+from mien.formats.head_folder import check_head_place, is_head_folder, write_head
+from mien.formats.video import write_video
 from mien.model.fit import Fit, FitOptions, fit_views
 from mien.model.head import ATLAS, CYLINDER, NEUTRAL, Expression, FittedView, Head
+from mien.render.picture import turntable_frames
+from mien.report import ReportInput, render_report
 from mien.texture.atlas import atlas_surface
 from mien.texture.cylinder import cylinder_surface, fit_cylinder
-from mien.texture.extract import extract_texture
+from mien.texture.extract import Texture, extract_texture
 from mien.texture.fill import Fill
 from mien.texture.surface import SurfaceMap
 
 Progress = Callable[[str, int, int], None]
 """Told the stage, the steps done and their total."""
+
+TURNTABLE = "turntable.mp4"
 
 
 @dataclass(frozen=True)
@@ -43,11 +51,17 @@ class BuildOptions:
 
 @dataclass(frozen=True)
 class Build:
-    """A head and how it came about, for those who want to look closer."""
+    """A head and how it came about, for those who want to look closer.
+
+    Attributes:
+        head: the result. capture: the photos with landmarks and marks. fits: by expression.
+        coverage: (H, W) summed weights of the photos in the neutral atlas.
+    """
 
     head: Head
     capture: Capture
     fits: dict[str, Fit]
+    coverage: Float[Array, "h w"]
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -83,7 +97,8 @@ def build(
         fits[name] = fit_views(views, generic, options.fit)
     tell("Solving cameras and shape", len(fits), len(fits))
     head = _head(capture, fits, generic)
-    return Build(_textured(head, capture, options, tell), capture, fits)
+    textures, coverage = _extract_textures(head, capture, options, tell)
+    return Build(replace(head, textures=textures), capture, fits, coverage)
 
 
 def _head(capture: Capture, fits: dict[str, Fit], generic: GenericHead) -> Head:
@@ -113,28 +128,28 @@ def _expression(name: str, fit: Fit) -> Expression:
     return Expression(fit.vertices, views, ATLAS if name == NEUTRAL else name)
 
 
-def _textured(head: Head, capture: Capture, options: BuildOptions, tell: Progress) -> Head:
-    """The head with an atlas for every expression and neutral's cylinder (P02 sec. 5.2.2)."""
+def _extract_textures(
+    head: Head, capture: Capture, options: BuildOptions, tell: Progress
+) -> tuple[dict[str, UInt8[Array, "h w 3"]], Float[Array, "h w"]]:
+    """An atlas for every expression, neutral's cylinder (P02 sec. 5.2.2), neutral's coverage."""
     stage, total = "Extracting textures", len(head.expressions) + 1
     tell(stage, 0, total)
-    textures: dict[str, UInt8[Array, "h w 3"]] = {}
+    textures: dict[str, Texture] = {}
     side = options.texture_size
     for name, expression in head.expressions.items():
-        mesh = head.expression_mesh(name)
-        atlas = atlas_surface(mesh, width=side, height=side)
-        textures[expression.texture] = _texture(head, capture, name, atlas, options.fill)
+        atlas = atlas_surface(head.expression_mesh(name), width=side, height=side)
+        textures[expression.texture] = _extract(head, capture, name, atlas, options.fill)
         tell(stage, len(textures), total)
     around = cylinder_surface(head.mesh, fit_cylinder(head.mesh), parts=("skin",))
-    textures[CYLINDER] = _texture(head, capture, NEUTRAL, around, options.fill)
+    textures[CYLINDER] = _extract(head, capture, NEUTRAL, around, options.fill)
     tell(stage, total, total)
-    return replace(head, textures=textures)
+    pixels = {name: texture.pixels for name, texture in textures.items()}
+    return pixels, textures[ATLAS].coverage
 
 
-def _texture(
-    head: Head, capture: Capture, name: str, surface: SurfaceMap, fill: Fill
-) -> UInt8[Array, "h w 3"]:
+def _extract(head: Head, capture: Capture, name: str, surface: SurfaceMap, fill: Fill) -> Texture:
     generic = load_generic_head()
-    photos = {view.photo.name: view.photo.pixels for view in capture.expressions[name]}
+    photos = _photos(capture)
     views = head.expressions[name].views
     return extract_texture(
         head.expression_mesh(name),
@@ -144,4 +159,44 @@ def _texture(
         fill=fill,
         mirror=generic.mirror,
         regions=generic.regions,
-    ).pixels
+    )
+
+
+def _photos(capture: Capture) -> dict[str, UInt8[Array, "h w 3"]]:
+    return {view.photo.name: view.photo.pixels for view in capture.views}
+
+
+def build_head_folder(
+    source: str | Path,
+    folder: str | Path,
+    *,
+    options: BuildOptions | None = None,
+    progress: Progress | None = None,
+) -> Build:
+    """As build, and written as a head folder with its report and a turntable video.
+
+    Raises: as build; InputError: the place holds something that is no head folder, or cannot be
+        written. Whatever was there stays until the new folder is whole.
+    """
+    tell = progress or (lambda stage, done, total: None)
+    check_head_place(folder)
+    result = build(source, options=options, progress=progress)
+    stage = "Writing the head"
+    with atomic_folder(folder, replaces=is_head_folder) as place:
+        tell(stage, 0, 3)
+        photos = _photos(result.capture)
+        used = [(view.photo, photos[view.photo]) for view in result.head.views]
+        write_head(result.head, place, photos=used)
+        for view in result.capture.views:
+            if view.annotations:
+                file = place / "annotations" / f"{view.photo.stem}.json"
+                save_annotations(file, view.photo, view.annotations)
+        tell(stage, 1, 3)
+        write_video(place / TURNTABLE, turntable_frames(result.head), fps=24)
+        tell(stage, 2, 3)
+        report = ReportInput(
+            result.head, photos, result.fits, result.coverage, result.notes, TURNTABLE
+        )
+        (place / "report.html").write_text(render_report(report), encoding="utf-8")
+        tell(stage, 3, 3)
+    return result

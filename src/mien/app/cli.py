@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import sys
+from math import radians
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
-from mien.app.options import parse_amounts, parse_size
+from mien.app.options import parse_amounts, parse_colour, parse_size
 from mien.app.progress import terminal_progress
 from mien.errors import MienError
 
@@ -20,6 +21,9 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+Curves = Literal["epipolar", "arc-length"]
+FillChoice = Literal["pyramid", "grow"]
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, no bars.")]
 Output = Annotated[Path, typer.Option("-o", "--output", help="Where the result goes.")]
@@ -42,39 +46,56 @@ def demo(
 @app.command()
 def build(
     source: Annotated[
-        Path, typer.Argument(help="A folder of photos (or of one folder an expression), a photo, a video.")
+        Path,
+        typer.Argument(
+            help="A folder of photos (or of one folder an expression), a photo, a video."
+        ),
     ],
     output: Output,
     adjust: Annotated[
         bool, typer.Option(help="Adjust all cameras and points jointly after P02's five steps.")
     ] = True,
     curves: Annotated[
-        str, typer.Option(help="How drawn curves become points: epipolar or arc-length.")
+        Curves, typer.Option(help="How drawn curves become points in the second photo and on.")
     ] = "epipolar",
-    kernel: Annotated[str, typer.Option(help="Radial basis of the shape's deformation.")] = "exponential",
-    fill: Annotated[str, typer.Option(help="Where no photo shows: pyramid or grow.")] = "pyramid",
-    texture_size: Annotated[int, typer.Option(help="Side of the texture atlas, px.")] = 2048,
-    interpupillary_mm: Annotated[float, typer.Option(help="Measured distance of the pupils.")] = 63.0,
-    face: Annotated[int | None, typer.Option(help="Which face, largest first, from 0.")] = None,
-    frames: Annotated[int, typer.Option(help="How many frames to pick from a video.")] = 7,
+    kernel: Annotated[
+        str, typer.Option(help="Radial basis of the deformation (docs/pose-recovery.md).")
+    ] = "exponential",
+    fill: Annotated[
+        FillChoice, typer.Option(help="How texture that no photo shows is filled.")
+    ] = "pyramid",
+    texture_size: Annotated[
+        int, typer.Option(min=64, max=8192, help="Side of the texture, px.")
+    ] = 2048,
+    interpupillary_mm: Annotated[
+        float, typer.Option(min=30, max=100, help="Measured distance between the pupils.")
+    ] = 63.0,
+    face: Annotated[
+        int | None,
+        typer.Option(min=1, help="Which face, from left to right from 1; the largest by default."),
+    ] = None,
+    frames: Annotated[
+        int, typer.Option(min=1, max=24, help="How many frames to pick from a video.")
+    ] = 7,
     json_: Json = False,
 ) -> None:
     """Photos to a head folder: cameras, shape, texture and a report."""
+    from mien.app.summary import summary_json, summary_text
     from mien.build import BuildOptions, build_head_folder
+    from mien.model.fit import FitOptions
 
     options = BuildOptions(
-        adjust=adjust,
-        curves=curves,
-        kernel=kernel,
+        fit=FitOptions(
+            adjust=adjust, curves=curves, kernel=kernel, interpupillary_mm=interpupillary_mm
+        ),
         fill=fill,
         texture_size=texture_size,
-        interpupillary_mm=interpupillary_mm,
         face=face,
         frames=frames,
     )
     with terminal_progress(json_) as progress:
-        summary = build_head_folder(source, output, options=options, progress=progress)
-    _print(json_, summary.to_json(), summary.to_text())
+        result = build_head_folder(source, output, options=options, progress=progress)
+    _print(json_, summary_json(result, output), summary_text(result, output))
 
 
 @app.command()
@@ -85,9 +106,15 @@ def render(
     pitch: Annotated[float, typer.Option(help="Degrees; the head tips down.")] = 0.0,
     roll: Annotated[float, typer.Option(help="Degrees; the head tips to its own right.")] = 0.0,
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in px.")] = "800x1000",
-    camera: Annotated[str | None, typer.Option(help="Reproduce the view of this photo.")] = None,
-    unit: Annotated[list[str] | None, typer.Option(help="A face unit, as jawOpen=0.5.")] = None,
-    background: Annotated[str | None, typer.Option(help="A colour, as #204060.")] = None,
+    camera: Annotated[
+        str | None, typer.Option(metavar="PHOTO", help="Reproduce the view of this photo.")
+    ] = None,
+    unit: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=AMOUNT", help="A face unit, as jawOpen=0.5.")
+    ] = None,
+    background: Annotated[
+        str | None, typer.Option(metavar="COLOUR", help="As #204060; transparent by default.")
+    ] = None,
     json_: Json = False,
 ) -> None:
     """A picture of the head, with alpha."""
@@ -95,15 +122,18 @@ def render(
     from mien.formats.image import save_image
     from mien.render.picture import render_head
 
+    width_height = parse_size("--size", size)
+    units = parse_amounts("--unit", unit or [])
+    colour = None if background is None else parse_colour("--background", background)
     picture = render_head(
         load_head(head),
-        yaw_deg=yaw,
-        pitch_deg=pitch,
-        roll_deg=roll,
-        size=parse_size("--size", size),
+        yaw=radians(yaw),
+        pitch=radians(pitch),
+        roll=radians(roll),
+        size=width_height,
         photo=camera,
-        units=parse_amounts("--unit", unit or []),
-        background=background,
+        units=units,
+        background=colour,
     )
     save_image(output, picture)
     _print(json_, {"output": str(output)}, str(output))
@@ -137,7 +167,9 @@ def main(arguments: list[str] | None = None) -> int:
         # anything else is a bug and keeps its traceback only on request.
         if hasattr(error, "format_message"):
             return _fail(error.format_message(), debug)
-        return _fail(f"internal error: {type(error).__name__}: {error} (--debug shows where)", debug)
+        return _fail(
+            f"internal error: {type(error).__name__}: {error} (--debug shows where)", debug
+        )
     return 0
 
 

@@ -25,3 +25,13 @@ def parse_amounts(name: str, texts: list[str]) -> dict[str, float]:
         except ValueError:
             raise InputError(name, "NAME=AMOUNT, as jawOpen=0.5", text) from None
     return amounts
+
+
+def parse_colour(name: str, text: str) -> tuple[int, int, int]:
+    """`#204060` to (32, 64, 96). Raises: InputError."""
+    digits = text.removeprefix("#")
+    try:
+        red, green, blue = bytes.fromhex(digits)
+    except ValueError:
+        raise InputError(name, "a colour, as #204060", text) from None
+    return red, green, blue

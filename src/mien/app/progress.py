@@ -36,9 +36,14 @@ def terminal_progress(quiet: bool) -> Iterator[Progress]:
     tasks: dict[str, TaskID] = {}
 
     def advance(stage: str, done: int, total: int) -> None:
+        if not tasks:
+            bars.start()
         if stage not in tasks:
             tasks[stage] = bars.add_task(stage, total=total or None)
         bars.update(tasks[stage], completed=done, total=total or None)
 
-    with bars:
+    try:
         yield advance
+    finally:
+        if tasks:
+            bars.stop()

@@ -66,8 +66,9 @@ def alternate(
     kept only if the next sweep finds a lower cost there, else the plain sweep's result is used.
 
     Args:
-        image: (K, N, 2) px relative to the principal points; weights: (K, N), 0 unseen.
-        loss, sigma_px: robust loss and the residual, per axis, at which it begins to bend.
+        image: (K, N, 2) px relative to the principal points; weights: (K, N), relative
+            inverse variances, 0 unseen.
+        loss, sigma_px: robust loss, and the deviation per axis of an observation of weight 1.
         history: sweeps that the acceleration remembers; 0 is P02's plain iteration.
         tolerance: relative decrease of the cost over five sweeps at which they have settled.
     """
@@ -107,10 +108,10 @@ def _sweep(
     The order is P02's, s, m, R, t, eta, entered at m. Points seen once fit any pose and would only
     hold the poses where they are, so they are left out of the cameras' steps.
     """
-    bend = _bend(poses, points, image, loss, sigma_px)[1]
+    bend = _bend(poses, points, image, weights, loss, sigma_px)[1]
     points = step_points(poses, points, image, weights * bend, anchor)
-    values, bend = _bend(poses, points, image, loss, sigma_px)
-    cost = float(sigma_px**2 * (weights * values).sum())
+    values, bend = _bend(poses, points, image, weights, loss, sigma_px)
+    cost = float(sigma_px**2 * values.sum())
     shared = weights * bend * (np.count_nonzero(weights, axis=0) >= 2)
     poses = step_rotation(poses, points, image, shared)
     poses = step_shift(poses, points, image, shared)
@@ -120,10 +121,10 @@ def _sweep(
 
 
 def _bend(
-    poses: Poses, points: Array, image: Array, loss: Loss, sigma_px: float
+    poses: Poses, points: Array, image: Array, weights: Array, loss: Loss, sigma_px: float
 ) -> tuple[Array, Array]:
     squared = ((reprojection(poses, points) - image) ** 2).sum(axis=-1)
-    return loss(squared / sigma_px**2)
+    return loss(weights * squared / sigma_px**2)
 
 
 def _settled(costs: list[float], tolerance: float, observations: float) -> bool:

@@ -56,7 +56,7 @@ def _far_vertices(
     skin = np.unique(generic.mesh.triangles[generic.mesh.triangles_of("skin")])
     far = skin[cKDTree(places).query(vertices[skin])[0] > ANCHOR_DISTANCE_MM]
     if len(far) == 0:
-        return far
+        return np.zeros(0, np.int64)
     chosen = [int(far[0])]
     distance = np.full(len(far), np.inf)
     for _ in range(min(ANCHORS, len(far)) - 1):

@@ -49,7 +49,8 @@ class Features:
     @property
     def seen(self) -> Bool[Array, "k n"]:
         """(K, N) where a photo shows a feature."""
-        return np.isfinite(self.sigma_mm)
+        seen: Array = np.asarray(np.isfinite(self.sigma_mm))
+        return seen
 
     def on(self, vertices: Float[Array, "... v 3"]) -> Float[Array, "... n 3"]:
         """Where the features lie on a head (or on each of a stack of offset fields), mm."""
@@ -61,7 +62,7 @@ class Features:
     def of_photos(self, keep: Bool[Array, " k"]) -> Features:
         """Only these photos; features that none of them shows are dropped."""
         image, sigma = self.image_points[keep], self.sigma_mm[keep]
-        used = np.isfinite(sigma).any(axis=0)
+        used: Array = np.asarray(np.isfinite(sigma).any(axis=0))
         return Features(
             names=tuple(name for name, use in zip(self.names, used, strict=True) if use),
             corners=self.corners[used],

@@ -230,8 +230,7 @@ def _intersect(
 
 def _shown(features: Features, keep: Bool[Array, " k"]) -> Bool[Array, " n"]:
     """(N,) features that one of these photos shows."""
-    shown: Array = features.seen[keep].any(axis=0)
-    return shown
+    return np.asarray(features.seen[keep].any(axis=0))
 
 
 def _sigma_px(features: Features, cameras: Sequence[Camera]) -> Float[Array, "k n"]:

@@ -17,6 +17,7 @@ from mien.model.pose_problem import (
     joint_sigma,
     residual_lengths,
     rms_per_photo,
+    weighted_lengths,
 )
 from mien.model.pose_start import estimate_poses, poses_from_rotations, resect_robustly
 from mien.numeric.robust import loss_named
@@ -27,7 +28,8 @@ __all__ = ["PoseResult", "recover_pose"]
 _MIN_POINTS = 6
 _ROUNDS, _SWEEPS_A_ROUND = 6, 30
 """Robust rounds, each with the residual scale that the last one left."""
-_REJECT_SIGMAS = 5.0
+_REJECT_SIGMAS = (7.0, 5.0)
+"""First in the robust solution, then in the least squares on what is left."""
 _MIN_TRUSTED = 0.6
 """Share of a photo's points that must agree with the other photos for it to count."""
 _MAX_RATIO, _MIN_MISFIT_MM = 4.0, 1.0
@@ -89,7 +91,7 @@ def recover_pose(
         principal_px: (K, 2); the image centres unless given.
         rotations: (K, 3, 3) rough R_cam_head, P02's way of starting; estimated unless given.
         focal_px: (K,) rough focal lengths, used only with rotations.
-        weights: (K, N) >= 0, trust in an observation.
+        weights: (K, N) >= 0, inverse variances of the observations up to a common factor.
         loss: "cauchy" or "huber" guard against bad points; "linear" is P02's least squares.
         history: sweeps that the acceleration remembers; 0 is P02's plain iteration.
         max_misfit_mm: a photo whose points lie farther (robust deviation) off the initial shape's
@@ -171,40 +173,44 @@ def _solve(
     state = Alternation(start, problem.points, np.inf, 0, True)
     if len(problem.image) == 1:
         return state, seen
+    if settings.loss == "linear":
+        return _alternate(problem, state, seen, settings, "linear", 1.0), seen
     sweeps = 0
-    if settings.loss != "linear":
-        for round_ in range(_ROUNDS):
-            sigma = joint_sigma(problem, state, seen)
-            limit = _SWEEPS_A_ROUND if round_ < _ROUNDS - 1 else settings.max_sweeps
-            state = _alternate(
-                problem, state, problem.weights, settings, settings.loss, sigma, limit
-            )
-            sweeps += state.sweeps
+    for round_ in range(_ROUNDS):
         sigma = joint_sigma(problem, state, seen)
-        seen = seen & (residual_lengths(problem, state) <= _REJECT_SIGMAS * sigma)
-    weights = problem.weights * seen
-    state = _alternate(problem, state, weights, settings, "linear", 1.0, settings.max_sweeps)
-    return replace(state, sweeps=sweeps + state.sweeps), seen
+        limit = _SWEEPS_A_ROUND if round_ < _ROUNDS - 1 else None
+        state = _alternate(problem, state, seen, settings, settings.loss, sigma, limit)
+        sweeps += state.sweeps
+    trusted = seen
+    for round_, limit_sigmas in enumerate(_REJECT_SIGMAS):
+        sigma = joint_sigma(problem, state, trusted, robust=round_ == 0)
+        fits = seen & (weighted_lengths(problem, state) <= limit_sigmas * sigma)
+        if round_ > 0 and (fits == trusted).all():
+            break
+        trusted = fits
+        state = _alternate(problem, state, trusted, settings, "linear", 1.0)
+        sweeps += state.sweeps
+    return replace(state, sweeps=sweeps), trusted
 
 
 def _alternate(
     problem: PoseProblem,
     state: Alternation,
-    weights: Array,
+    used: Bool[Array, "k n"],
     settings: _Settings,
     loss: str,
     sigma_px: float,
-    max_sweeps: int,
+    max_sweeps: int | None = None,
 ) -> Alternation:
     return alternate(
         state.poses,
         state.points,
         problem.image,
-        weights,
+        problem.weights * used,
         loss=loss_named(loss),
         sigma_px=sigma_px,
         history=settings.history,
-        max_sweeps=max_sweeps,
+        max_sweeps=max_sweeps or settings.max_sweeps,
         tolerance=settings.tolerance,
     )
 

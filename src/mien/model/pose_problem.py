@@ -12,7 +12,14 @@ from mien.model.alternation import Alternation
 from mien.model.five_steps import reprojection
 from mien.numeric.robust import robust_sigma
 
-__all__ = ["PoseProblem", "check_problem", "joint_sigma", "residual_lengths", "rms_per_photo"]
+__all__ = [
+    "PoseProblem",
+    "check_problem",
+    "joint_sigma",
+    "residual_lengths",
+    "rms_per_photo",
+    "weighted_lengths",
+]
 
 SIGMA_FLOOR_PX = 1e-3
 """Residual scales below this are exact data; a smaller scale would only amplify rounding."""
@@ -24,7 +31,7 @@ class PoseProblem:
 
     Attributes:
         image: (K, N, 2) px relative to the principal points, 0 where unseen.
-        weights: (K, N), 0 where unseen.
+        weights: (K, N), inverse variances with a median of 1, 0 where unseen.
         points: (N, 3) mm relative to center. center: (3,) mm.
         sizes: (K, 2) px. principal: (K, 2) px.
     """
@@ -67,6 +74,8 @@ def check_problem(
     if (trust < 0).any():
         raise InputError("weights", "numbers of 0 or more", trust.min())
     trust = np.where(seen, trust, 0.0)
+    if trust.any():
+        trust = trust / np.median(trust[trust > 0])
     used = trust.any(axis=0)
     center = points[used].mean(axis=0) if used.any() else np.zeros(3)
     relative = np.where(seen[..., None], image - principal[:, None], 0.0)
@@ -80,14 +89,23 @@ def residual_lengths(problem: PoseProblem, solution: Alternation) -> Float[Array
     return lengths
 
 
-def joint_sigma(problem: PoseProblem, solution: Alternation, seen: Bool[Array, "k n"]) -> float:
-    """Robust residual deviation in px per axis, corrected for the unknowns fitted to the data."""
+def weighted_lengths(problem: PoseProblem, solution: Alternation) -> Float[Array, "k n"]:
+    """Reprojection errors as they would be with the median observation's variance, px."""
+    weighted: Array = np.sqrt(problem.weights) * residual_lengths(problem, solution)
+    return weighted
+
+
+def joint_sigma(
+    problem: PoseProblem, solution: Alternation, seen: Bool[Array, "k n"], *, robust: bool = True
+) -> float:
+    """Deviation in px per axis of the weighted errors, corrected for the unknowns fitted to them."""
     shared = seen & (seen.sum(axis=0) >= 2)
     rows = 2 * np.count_nonzero(shared)
     unknowns = 7 * len(seen) - 7 + 3 * np.count_nonzero(shared.any(axis=0))
     if rows <= unknowns:
         return SIGMA_FLOOR_PX
-    spread = robust_sigma(residual_lengths(problem, solution)[shared])
+    lengths = weighted_lengths(problem, solution)[shared]
+    spread = robust_sigma(lengths) if robust else float(np.sqrt((lengths**2).mean() / 2))
     return max(spread * float(np.sqrt(rows / (rows - unknowns))), SIGMA_FLOOR_PX)
 
 

@@ -109,7 +109,7 @@ def resect_robustly(
     trust, sigma = weights, np.ones(len(weights))
     for _ in range(_ROUNDS):
         poses = resect(poses, points, image, trust)
-        lengths = np.linalg.norm(reprojection(poses, points) - image, axis=-1)
+        lengths = np.linalg.norm(reprojection(poses, points) - image, axis=-1) * np.sqrt(weights)
         sigma = np.array([robust_sigma(d[w > 0]) for d, w in zip(lengths, weights, strict=True)])
         sigma = np.maximum(sigma, SIGMA_FLOOR_PX)
         trust = weights * loss_named(loss)((lengths / sigma[:, None]) ** 2)[1]

@@ -18,7 +18,7 @@ PAPER_RADIUS = 64 * 25.4
 # Signs make every kernel conditionally positive definite, so that smoothing smooths. The
 # exponential is written less 1, which the side condition sum(c) = 0 cancels: with P02's radius
 # all its values lie near 1 and the constant would cost half the digits.
-_KERNELS: dict[str, Callable[[Array], Array]] = {
+KERNELS: dict[str, Callable[[Array], Array]] = {
     "exponential": lambda r: np.expm1(-r),
     "gaussian": lambda r: np.exp(-(r**2)),
     "biharmonic": lambda r: -r,
@@ -102,8 +102,8 @@ def fit_rbf(
 
 
 def _check_radius(kernel: str, radius: float | None) -> float:
-    if kernel not in _KERNELS:
-        raise InputError("kernel", " or ".join(_KERNELS), kernel)
+    if kernel not in KERNELS:
+        raise InputError("kernel", " or ".join(KERNELS), kernel)
     if radius is not None:
         return check_positive("radius", radius)
     if kernel == "gaussian":
@@ -146,7 +146,7 @@ def _affine_terms(points: Array, origin: Array, axes: Array) -> Float[Array, "n 
 def _kernel_matrix(a: Array, b: Array, kernel: str, radius: float) -> Float[Array, "m n"]:
     from scipy.spatial.distance import cdist
 
-    return _KERNELS[kernel](cdist(a, b) / radius)
+    return KERNELS[kernel](cdist(a, b) / radius)
 
 
 def _solve_within(matrix: Array, terms: Array, values: Array) -> Float[Array, "n d"]:

@@ -1,0 +1,89 @@
+"""`mien demo`: the main job on photos that ship with mien."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from math import radians
+from pathlib import Path
+from typing import TypedDict
+
+from mien.build import TURNTABLE, Progress, build_head_folder
+from mien.formats.atomic import atomic_folder, check_folder_place
+from mien.formats.export import export_head
+from mien.formats.head_folder import is_head_folder
+from mien.formats.image import save_image
+from mien.model.head import Head
+from mien.render.picture import render_head
+
+
+class _Look(TypedDict):
+    size: tuple[int, int]
+    background: tuple[int, int, int]
+
+
+YAWS = {"front": 0, "left": -40, "left side": -90, "back": 180, "right side": 90, "right": 40}
+UNITS = {
+    "smile": {
+        "mouthSmileLeft": 0.8,
+        "mouthSmileRight": 0.8,
+        "cheekSquintLeft": 0.5,
+        "cheekSquintRight": 0.5,
+    },
+    "jaw open": {"jawOpen": 0.6},
+    "blink": {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0},
+    "brows up": {"browInnerUp": 1.0, "browOuterUpLeft": 0.8, "browOuterUpRight": 0.8},
+}
+_LOOK = _Look(size=(480, 600), background=(72, 74, 84))
+
+
+def demo_photos() -> Path:
+    """The folder with the two photos that ship with mien, and their annotations."""
+    return Path(str(files("mien.assets"))) / "data" / "james"
+
+
+def run_demo(folder: Path, *, progress: Progress) -> Path:
+    """Head, pictures, `.glb` and a page that shows them. Returns the page.
+
+    Raises: InputError: the folder holds something else or cannot be written.
+    """
+    check_folder_place(folder, replaces=_is_demo)
+    with atomic_folder(folder, replaces=_is_demo) as place:
+        head = build_head_folder(demo_photos(), place / "head", progress=progress).head
+        pictures = _save_pictures(head, place, progress)
+        export_head(head, place / "james.glb")
+        progress("Rendering and exporting", 2, 2)
+        page = _page(head, pictures)
+        (place / "index.html").write_text(page, encoding="utf-8")
+    return folder / "index.html"
+
+
+def _save_pictures(head: Head, place: Path, progress: Progress) -> dict[str, list[dict[str, str]]]:
+    """Pictures of the head, turned and with face units: captions and file names by section."""
+    progress("Rendering and exporting", 0, 2)
+    turned = {name: render_head(head, yaw=radians(yaw), **_LOOK) for name, yaw in YAWS.items()}
+    moved = {
+        name: render_head(head, yaw=radians(-20), units=units, **_LOOK)
+        for name, units in UNITS.items()
+    }
+    shown: dict[str, list[dict[str, str]]] = {}
+    for section, pictures in {"turned": turned, "units": moved}.items():
+        shown[section] = []
+        for name, picture in pictures.items():
+            file = f"pictures/{name.replace(' ', '_')}.jpg"
+            save_image(place / file, picture, quality=90)
+            shown[section].append({"file": file, "caption": name})
+    progress("Rendering and exporting", 1, 2)
+    return shown
+
+
+def _page(head: Head, pictures: dict[str, list[dict[str, str]]]) -> str:
+    from jinja2 import Environment, PackageLoader
+
+    page = Environment(loader=PackageLoader("mien.app", "."), autoescape=True)
+    return page.get_template("demo.html.j2").render(
+        photos=[view.photo for view in head.views], pictures=pictures, turntable=TURNTABLE
+    )
+
+
+def _is_demo(folder: Path) -> bool:
+    return (folder / "index.html").is_file() and is_head_folder(folder / "head")

@@ -1,0 +1,114 @@
+"""`report.html`: one file, with its pictures inside, that opens anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mien.arrays import Array, Float, UInt8
+from mien.camera import Camera
+from mien.model.fit import Fit, Mark, PhotoFit
+from mien.model.head import Head
+from mien.report.pictures import coverage_pictures, overlay_picture, preview_pictures
+
+
+@dataclass(frozen=True)
+class ReportInput:
+    """What a report tells about.
+
+    Attributes:
+        head: the result.
+        photos: (h, w, 3) pixels by photo name.
+        fits: by expression, with every mark and its residual.
+        coverage: (H, W) summed texture weights in the atlas; 0 where no photo shows the texel.
+        notes: what the user should know.
+        turntable: a video beside the report, or "".
+    """
+
+    head: Head
+    photos: Mapping[str, UInt8[Array, "h w 3"]]
+    fits: Mapping[str, Fit]
+    coverage: Float[Array, "h w"]
+    notes: tuple[str, ...] = ()
+    turntable: str = ""
+
+
+def render_report(data: ReportInput) -> str:
+    """The page's HTML."""
+    from jinja2 import Environment, PackageLoader
+
+    page = Environment(loader=PackageLoader("mien.report", "."), autoescape=True)
+    eyes = _interpupillary(data.head)
+    return page.get_template("report.html.j2").render(
+        title=f"{data.head.subject}: report of the build",
+        version=data.head.generator.removeprefix("mien "),
+        vertices=f"{len(data.head.mesh.vertices):,}",
+        interpupillary_mm=eyes,
+        notes=data.notes,
+        previews=preview_pictures(data.head),
+        coverage=coverage_pictures(data.head, data.coverage),
+        photos=[
+            _photo(data.head, name, fit.vertices, photo, data.photos[name])
+            for fit in data.fits.values()
+            for name, photo in fit.photos.items()
+        ],
+        turntable=data.turntable,
+    )
+
+
+def _photo(
+    head: Head,
+    name: str,
+    vertices: Float[Array, "v 3"],
+    fit: PhotoFit,
+    pixels: UInt8[Array, "h w 3"],
+) -> dict[str, Any]:
+    yaw, pitch, roll = head_angles(fit.camera)
+    return {
+        "name": name,
+        "width": fit.camera.width,
+        "height": fit.camera.height,
+        "focal_px": fit.camera.focal_px,
+        "yaw": yaw,
+        "pitch": pitch,
+        "roll": roll,
+        "distance_mm": float(np.linalg.norm(fit.camera.center)),
+        "points_used": len(fit.trusted),
+        "rms_px": fit.rms_px,
+        "overlay": overlay_picture(head.mesh.with_vertices(vertices), fit, pixels),
+        "residuals": [_residual(mark) for mark in fit.marks],
+    }
+
+
+def _residual(mark: Mark) -> dict[str, Any]:
+    return {
+        "name": mark.name,
+        "x": float(mark.image_point[0]),
+        "y": float(mark.image_point[1]),
+        "residual_px": mark.distance_px,
+        "trusted": not mark.verdict,
+        "verdict": mark.verdict or ("by hand" if mark.by_hand else "detected"),
+    }
+
+
+def head_angles(camera: Camera) -> tuple[float, float, float]:
+    """Degrees of yaw, pitch and roll of the head before the camera, signs as in conventions.md."""
+    facing = camera.R_cam_head @ np.array([0.0, 0.0, -1.0])
+    up = camera.R_cam_head @ np.array([0.0, -1.0, 0.0])
+    yaw = np.degrees(np.arctan2(-facing[0], facing[2]))
+    pitch = np.degrees(np.arcsin(np.clip(-facing[1], -1, 1)))
+    roll = np.degrees(np.arctan2(up[0], up[1]))
+    return float(yaw), float(pitch), float(roll)
+
+
+def _interpupillary(head: Head) -> float:
+    mesh = head.mesh
+    balls = [
+        np.unique(mesh.triangles[mesh.triangles_of(name)])
+        for name in ("left_eyeball", "right_eyeball")
+    ]
+    left, right = (mesh.vertices[ball].mean(axis=0) for ball in balls)
+    return float(np.linalg.norm(left - right))
