@@ -115,6 +115,20 @@ def test_bad_points_are_distrusted(make_scene, seed):
     assert scene.errors(result.cameras, result.points)[0].max() < 0.5
 
 
+def test_marks_that_agree_on_a_wrong_place_are_distrusted(make_scene):
+    """Two photos show it, one of them wrong along the epipolar line: the rays meet, far off."""
+    scene = make_scene(0, noise=0.5)
+    point = int(np.flatnonzero(np.isfinite(scene.image_points[..., 0]).sum(axis=0) == 2)[0])
+    wrong = scene.points.copy()
+    first, second = np.flatnonzero(np.isfinite(scene.image_points[:, point, 0]))
+    toward = scene.points[point] - scene.cameras[first].center
+    wrong[point] += 90 * toward / np.linalg.norm(toward)
+    scene.image_points[second, point] = scene.cameras[second].project(wrong)[point]
+    result = recover(scene)
+    assert not result.trusted[:, point].any()
+    np.testing.assert_allclose(result.points[point], scene.generic[point], atol=1e-9)
+
+
 def off_by(scene, result):
     projected = np.stack([camera.project(scene.points) for camera in scene.cameras])
     return np.linalg.norm(projected - scene.image_points, axis=-1)
@@ -212,3 +226,24 @@ def test_refuses_bad_input(make_scene, change, message):
     given = {"image_points": scene.image_points, "points": scene.generic, "sizes": scene.sizes}
     with pytest.raises(InputError, match=message):
         recover_pose(**{**given, **change})
+
+
+def test_observations_of_different_precision(make_scene):
+    """Weights are inverse variances: coarse marks neither spoil fine ones nor are thrown out."""
+    scene, rng = make_scene(0, noise=0.0, hidden=False), np.random.default_rng(0)
+    sigma = np.where(rng.random(scene.image_points.shape[:2]) < 0.3, 8.0, 0.5)
+    scene.image_points[:] += sigma[..., None] * rng.normal(size=scene.image_points.shape)
+    weighted = recover(scene, weights=1 / sigma**2)
+    equal = recover(scene, loss="linear")
+    assert weighted.trusted.mean() > 0.98
+    degrees = scene.errors(weighted.cameras, weighted.points)[0].mean()
+    assert degrees < 0.4 * scene.errors(equal.cameras, equal.points)[0].mean()
+    scaled = recover(scene, weights=100 / sigma**2)
+    np.testing.assert_allclose(scaled.points, weighted.points, atol=1e-4)
+
+
+def test_good_points_are_kept(make_scene):
+    for seed in range(6):
+        scene = make_scene(seed, noise=1.0, count=100)
+        seen = np.isfinite(scene.image_points[..., 0])
+        np.testing.assert_array_equal(recover(scene).trusted, seen)

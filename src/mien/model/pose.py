@@ -15,6 +15,7 @@ from mien.model.pose_problem import (
     PoseProblem,
     check_problem,
     joint_sigma,
+    moved_too_far,
     residual_lengths,
     rms_per_photo,
     weighted_lengths,
@@ -181,10 +182,11 @@ def _solve(
         limit = _SWEEPS_A_ROUND if round_ < _ROUNDS - 1 else None
         state = _alternate(problem, state, seen, settings, settings.loss, sigma, limit)
         sweeps += state.sweeps
-    trusted = seen
+    trusted, far = seen, np.zeros(seen.shape[1], bool)
     for round_, limit_sigmas in enumerate(_REJECT_SIGMAS):
         sigma = joint_sigma(problem, state, trusted, robust=round_ == 0)
-        fits = seen & (weighted_lengths(problem, state) <= limit_sigmas * sigma)
+        far |= moved_too_far(problem, state, trusted)
+        fits = seen & ~far & (weighted_lengths(problem, state) <= limit_sigmas * sigma)
         if round_ > 0 and (fits == trusted).all():
             break
         trusted = fits

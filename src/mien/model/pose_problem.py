@@ -11,11 +11,13 @@ from mien.errors import InputError
 from mien.model.alternation import Alternation
 from mien.model.five_steps import reprojection
 from mien.numeric.robust import robust_sigma
+from mien.numeric.similarity import estimate_similarity
 
 __all__ = [
     "PoseProblem",
     "check_problem",
     "joint_sigma",
+    "moved_too_far",
     "residual_lengths",
     "rms_per_photo",
     "weighted_lengths",
@@ -23,6 +25,9 @@ __all__ = [
 
 SIGMA_FLOOR_PX = 1e-3
 """Residual scales below this are exact data; a smaller scale would only amplify rounding."""
+
+_MIN_ALIGNED, _MOVED_SIGMAS, _LEAST_LIMIT_MM = 8, 12.0, 15.0
+"""Wide: ears differ from person to person by several times what noses do."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +103,7 @@ def weighted_lengths(problem: PoseProblem, solution: Alternation) -> Float[Array
 def joint_sigma(
     problem: PoseProblem, solution: Alternation, seen: Bool[Array, "k n"], *, robust: bool = True
 ) -> float:
-    """Deviation in px per axis of the weighted errors, corrected for the unknowns fitted to them."""
+    """Deviation in px per axis of the weighted errors, corrected for the number of unknowns."""
     shared = seen & (seen.sum(axis=0) >= 2)
     rows = 2 * np.count_nonzero(shared)
     unknowns = 7 * len(seen) - 7 + 3 * np.count_nonzero(shared.any(axis=0))
@@ -107,6 +112,20 @@ def joint_sigma(
     lengths = weighted_lengths(problem, solution)[shared]
     spread = robust_sigma(lengths) if robust else float(np.sqrt((lengths**2).mean() / 2))
     return max(spread * float(np.sqrt(rows / (rows - unknowns))), SIGMA_FLOOR_PX)
+
+
+def moved_too_far(
+    problem: PoseProblem, solution: Alternation, trusted: Bool[Array, "k n"]
+) -> Bool[Array, " n"]:
+    """Points that left the initial shape as no others did: two marks agreed on a wrong place."""
+    told = trusted.sum(axis=0) >= 2
+    if np.count_nonzero(told) < _MIN_ALIGNED:
+        return np.zeros(len(told), bool)
+    move = estimate_similarity(solution.points[told], problem.points[told])
+    moved = np.linalg.norm(move(solution.points) - problem.points, axis=1)
+    limit = max(_MOVED_SIGMAS * robust_sigma(moved[told], 3), _LEAST_LIMIT_MM)
+    far: Array = told & (moved > limit)
+    return far
 
 
 def rms_per_photo(
