@@ -103,19 +103,10 @@ def adjust_bundle(
     )
     data = replace(data, marginal=marginal)
 
-    def linearize(bundle: Bundle) -> Callable[[float], tuple[tuple[Array, Array], float]]:
-        system = linearize_bundle(bundle, data)
-
-        def solve(damping: float) -> tuple[tuple[Array, Array], float]:
-            common, blocks, fall = system.solve(damping)
-            return (common, blocks), fall
-
-        return solve
-
     result = minimize_lm(
         start,
         cost=lambda bundle: bundle_cost(bundle, data),
-        linearize=linearize,
+        linearize=lambda bundle: _stepper(bundle, data),
         move=move_bundle,
         max_iterations=max_iterations,
         tolerance=tolerance,
@@ -135,6 +126,19 @@ def adjust_bundle(
         rotation_sd=rotation_sd,
         focal_sd=focal_sd,
     )
+
+
+def _stepper(
+    bundle: Bundle, data: BundleData
+) -> Callable[[float], tuple[tuple[Array, Array], float]]:
+    """For a damping, the step from here and the fall of the cost that it promises."""
+    system = linearize_bundle(bundle, data)
+
+    def step(damping: float) -> tuple[tuple[Array, Array], float]:
+        common, blocks, fall = system.solve(damping)
+        return (common, blocks), fall
+
+    return step
 
 
 def _bundle_problem(
