@@ -20,7 +20,7 @@ from mien.model.bundle import (
     move_bundle,
     similarity_constraints,
 )
-from mien.numeric.lm import minimize_lm
+from mien.numeric.lm import LmResult, minimize_lm
 from mien.numeric.robust import loss_named
 
 __all__ = ["Adjustment", "FocalPrior", "ShapePrior", "adjust_bundle"]
@@ -111,13 +111,20 @@ def adjust_bundle(
         max_iterations=max_iterations,
         tolerance=tolerance,
     )
-    adjusted = _cameras(cameras, result.x, data)
-    projected = np.stack([camera.project(result.x.points) for camera in adjusted])
-    point_sd, rotation_sd, focal_sd = _deviations(result.x, data)
+    return _adjustment(cameras, image_points, data, result)
+
+
+def _adjustment(
+    starts: Sequence[Camera], image_points: Array, data: BundleData, result: LmResult[Bundle]
+) -> Adjustment:
+    bundle = result.x
+    cameras = _cameras(starts, bundle, data)
+    projected = np.stack([camera.project(bundle.points) for camera in cameras])
+    point_sd, rotation_sd, focal_sd = _deviations(bundle, data)
     return Adjustment(
-        cameras=tuple(adjusted),
-        points=result.x.points,
-        coefficients=result.x.coefficients,
+        cameras=tuple(cameras),
+        points=bundle.points,
+        coefficients=bundle.coefficients,
         residuals=np.where(data.precision[..., None] > 0, projected - image_points, np.nan),
         cost=result.cost,
         iterations=result.iterations,
