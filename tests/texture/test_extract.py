@@ -150,10 +150,11 @@ def test_regions_are_filled_from_themselves(mesh: Mesh) -> None:
     truth = np.full((256, 512, 3), (180, 130, 110), np.uint8)
     truth[:90] = (30, 25, 20)  # Hair above 27 degrees of latitude.
     scalp = np.clip((mesh.uvs[:, 1] - 0.62) / 0.06, 0, 1)  # Half in the region at the hairline.
+    regions = {"scalp": scalp, "neck": 1 - scalp}
     camera = camera_at(0, mesh)
     taken = photo(mesh, camera, truth)
     surface = atlas_surface(mesh, width=256, height=128)
-    texture = extract_texture(mesh, [camera], [taken], surface=surface, regions={"scalp": scalp})
+    texture = extract_texture(mesh, [camera], [taken], surface=surface, regions=regions)
     back = texture.pixels[:, :20].astype(int)
     assert np.abs(back[5:38] - (30, 25, 20)).max() < 12
     assert np.abs(back[52:120] - (180, 130, 110)).max() < 12

@@ -58,9 +58,8 @@ def test_regions_do_not_run_into_each_other() -> None:
     mouth = ((mesh.vertices[:, 2] > 70) & (mesh.vertices[:, 1] < 0)).astype(float)
     blend = uniform((180, 130, 110), coarse.points[..., 2] > 0)
     blend.colours[coarse.points[..., 1] > 35] = (30, 25, 20)
-    backdrop = make_backdrop(
-        coarse, mesh, blend, cylinder, "pyramid", {"scalp": hair, "mouth_cavity": mouth}
-    )
+    regions = {"scalp": hair, "neck": 1 - hair, "mouth_cavity": mouth}
+    backdrop = make_backdrop(coarse, mesh, blend, cylinder, "pyramid", regions)
     np.testing.assert_allclose(backdrop.masks.sum(axis=0), 1, atol=1e-9)
     surface = atlas_surface(mesh, width=100, height=80)
     colours = np.zeros((80, 100, 3), np.float32)

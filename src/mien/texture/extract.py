@@ -14,9 +14,18 @@ from mien.errors import EstimationError, InputError
 from mien.mesh import Mesh
 from mien.texture.atlas import fill_gutters
 from mien.texture.blend import Blend, blend_views
-from mien.texture.cylinder import cylinder_surface, fit_cylinder
+from mien.texture.cylinder import Cylinder, cylinder_surface, fit_cylinder
 from mien.texture.equalize import estimate_gains
-from mien.texture.fill import FILLS, Backdrop, Fill, fill_part, make_backdrop, over
+from mien.texture.fill import (
+    FILLS,
+    Backdrop,
+    Fill,
+    fill_part,
+    make_backdrop,
+    mirror_difference,
+    on_cylinder,
+    over,
+)
 from mien.texture.parts import SEE_THROUGH, SKIN, STYLES, PartStyle, fill_colour
 from mien.texture.subject import subject_mask
 from mien.texture.surface import SurfaceMap, cropped, mirrored, parts_of, restricted
@@ -51,7 +60,9 @@ class _Job:
     feather_mm: float
     certainty_power: float
     fill: Fill
-    mirror: Int[Array, " v"] | None
+    cylinder: Cylinder
+    mirror: Int[Array, " v"] | None = None
+    mirror_difference: Float[Array, "h w 3"] | None = None
 
 
 def extract_texture(
@@ -88,17 +99,20 @@ def extract_texture(
         shows; parts are done one by one (sec. 5.2.4).
     """
     job = _prepare(mesh, cameras, photos, surface, feather_mm, fill, find_subject)
-    job = replace(job, certainty_power=certainty_power, mirror=mirror)
-    cylinder = fit_cylinder(mesh)
+    job = replace(job, certainty_power=certainty_power)
     skin = ("skin",) if "skin" in mesh.part_names else mesh.part_names
     width, height = _COARSE
-    coarse = cylinder_surface(mesh, cylinder, width=width, height=height, parts=skin)
+    coarse = cylinder_surface(mesh, job.cylinder, width=width, height=height, parts=skin)
     if equalize:
         job = replace(job, gains=estimate_gains(coarse, job.views, feather_mm=feather_mm))
     around = _blend(job, coarse, SKIN)
     if not around.coverage.any():
         raise EstimationError("no photo sees the head where its camera says it is")
-    backdrop = make_backdrop(coarse, mesh, around, cylinder, fill, regions or {})
+    if mirror is not None:
+        difference = mirror_difference(around, _blend(job, mirrored(coarse, mesh, mirror), SKIN))
+        job = replace(job, mirror=mirror, mirror_difference=difference)
+        around = _blend(job, coarse, SKIN)
+    backdrop = make_backdrop(coarse, mesh, around, job.cylinder, fill, regions or {})
     pixels = _background(surface, backdrop)
     coverage = np.zeros(surface.triangle_ids.shape, np.float32)
     for name in mesh.part_names:
@@ -136,7 +150,7 @@ def _prepare(
     for camera, photo in zip(cameras, photos, strict=True):
         subject = subject_mask(solid, camera, photo) if find_subject else None
         views.append(prepare_view(solid, camera, photo, texel_mm=surface.texel_mm, subject=subject))
-    return _Job(mesh, views, np.ones((len(views), 3)), feather_mm, 1.0, fill, None)
+    return _Job(mesh, views, np.ones((len(views), 3)), feather_mm, 1.0, fill, fit_cylinder(mesh))
 
 
 def _texture_part(
@@ -180,9 +194,13 @@ def _blend(job: _Job, surface: SurfaceMap, style: PartStyle) -> Blend:
         single.sort(key=lambda blend: -float(blend.coverage.sum()))
         return reduce(over, single)
     blend = blended(surface, everything)
-    if job.mirror is None:
+    if job.mirror is None or job.mirror_difference is None:
         return blend
-    return over(blend, blended(mirrored(surface, job.mesh, job.mirror), everything))
+    other = blended(mirrored(surface, job.mesh, job.mirror), everything)
+    used = (other.confidence > 0) & (blend.confidence < 1)
+    shift = on_cylinder(job.mirror_difference, job.cylinder, surface.points[used])
+    other.colours[used] = np.clip(other.colours[used] + shift, 0, 255)
+    return over(blend, other)
 
 
 def _background(surface: SurfaceMap, backdrop: Backdrop) -> Float[Array, "h w 3"]:

@@ -14,14 +14,14 @@ from mien.numeric.pyramid import fill_growing, fill_pyramid
 from mien.numeric.sample import sample_bilinear
 from mien.texture.blend import Blend
 from mien.texture.cylinder import Cylinder
-from mien.texture.parts import FILLED_ALONE, REGION_COLOURS
+from mien.texture.parts import EARS, FILLED_ALONE, REGION_COLOURS
 from mien.texture.surface import SurfaceMap, over_vertices
 
 Fill = Literal["pyramid", "grow", "none"]
 FILLS: tuple[Fill, ...] = ("pyramid", "grow", "none")
 
-# A region is filled from itself when the photos show this many of its coarse texels (4 cm^2).
-_FEWEST = 300
+# A region is filled from itself when the photos show this many of its coarse texels (1 cm^2).
+_FEWEST = 80
 
 
 def fill_image(blend: Blend, fill: Fill, *, wrap: bool) -> Float[Array, "h w 3"]:
@@ -87,17 +87,45 @@ class Backdrop:
         self, surface: SurfaceMap, mesh: Mesh, texels: Bool[Array, "h w"]
     ) -> Float[Array, "n 3"]:
         """(N, 3) float32 of chosen texels."""
-        height, width = self.images.shape[1:3]
-        uvs = self.cylinder.uvs(surface.points[texels].astype(np.float64))
-        # One column more at either end, so that lookups go around.
-        places = np.column_stack([uvs[:, 0] * width + 1, (1 - uvs[:, 1]) * height])
-        total = np.zeros((len(places), 3), np.float32)
+        points = surface.points[texels]
+        total = np.zeros((len(points), 3), np.float32)
         for image, mask in zip(self.images, self.masks, strict=True):
             share = over_vertices(surface, mesh, mask, texels)
             inside = share > 1e-3
-            padded = np.concatenate([image[:, -1:], image, image[:, :1]], axis=1)
-            total[inside] += share[inside, None] * sample_bilinear(padded, places[inside])
+            seen = on_cylinder(image, self.cylinder, points[inside])
+            total[inside] += share[inside, None] * seen
         return total
+
+
+def on_cylinder(
+    image: Float[Array, "h w 3"], cylinder: Cylinder, points: Float[Array, "n 3"]
+) -> Float[Array, "n 3"]:
+    """Colours of an image around the head, as points in head space (mm) see it."""
+    height, width = image.shape[:2]
+    uvs = cylinder.uvs(points.astype(np.float64))
+    # One column more at either end, so that lookups go around.
+    padded = np.concatenate([image[:, -1:], image, image[:, :1]], axis=1)
+    places = np.column_stack([uvs[:, 0] * width + 1, (1 - uvs[:, 1]) * height])
+    return sample_bilinear(padded, places)
+
+
+def mirror_difference(blend: Blend, other: Blend) -> Float[Array, "h w 3"]:
+    """What to add to the other side's colours so that they go on where the photos end.
+
+    Args:
+        blend: the photos on the coarse cylinder. other: their mirror image there.
+    Returns: (H, W, 3) float32: the difference where both are known, smoothed over 10 mm or so and
+        continued over the rest; light seldom falls alike on both sides.
+    """
+    import cv2
+
+    both = np.minimum(blend.confidence, other.confidence)
+    if not both.any():
+        return np.zeros(blend.colours.shape, np.float32)
+    difference = (blend.colours - other.colours) * both[..., None]
+    weight = cv2.GaussianBlur(both, (0, 0), 4)
+    smooth = cv2.GaussianBlur(difference, (0, 0), 4) / np.maximum(weight, 1e-6)[..., None]
+    return fill_pyramid(smooth, both, wrap=True)
 
 
 def make_backdrop(
@@ -112,31 +140,41 @@ def make_backdrop(
 
     Args:
         coarse: the skin on the cylinder. blend: the photos on it.
-        regions: (V,) soft masks by name; what they leave is filled from itself too, and so is,
-            with it, every region of which the photos show next to nothing.
+        regions: (V,) soft masks by name; what they leave, and every region of which the photos
+            show next to nothing, is filled from everything but the ears; an ear that they do
+            not show, from the skin.
     Raises: InputError: a mask that does not fit the mesh.
     """
-    shape = coarse.triangle_ids.shape
-    images, masks = [], []
     left = np.ones(len(mesh.vertices))
-    for name in (*FILLED_ALONE, *REGION_COLOURS):
-        if name not in regions:
-            continue
-        mask = np.minimum(check_array(name, regions[name], left.shape), left)
-        if name in REGION_COLOURS:
-            image = np.empty((*shape, 3), np.float32)
-            image[:] = REGION_COLOURS[name]
-        else:
+    images, masks = [], []
+    for name, colour in REGION_COLOURS.items():
+        if name in regions:
+            masks.append(np.minimum(check_array(name, regions[name], left.shape), left))
+            images.append(np.tile(np.array(colour, np.float32), (*coarse.triangle_ids.shape, 1)))
+            left = left - masks[-1]
+    ears, scalp = (_union(regions, names, left.shape) for names in (EARS, ("scalp",)))
+    for name in FILLED_ALONE:
+        if name in regions:
+            mask = np.minimum(check_array(name, regions[name], left.shape), left)
             own = _within(blend, coarse, mesh, mask)
+            if own.confidence.sum() < _FEWEST and name in EARS:
+                own = _within(blend, coarse, mesh, 1 - np.maximum(scalp, ears))
             if own.confidence.sum() < _FEWEST:
                 continue
-            image = fill_image(own, fill, wrap=True)
-        images.append(image)
-        masks.append(mask)
-        left = left - mask
-    rest = _within(blend, coarse, mesh, left)
+            masks.append(mask)
+            images.append(fill_image(own, fill, wrap=True))
+            left = left - mask
+    rest = _within(blend, coarse, mesh, 1 - ears)
     images.append(fill_image(rest if rest.confidence.any() else blend, fill, wrap=True))
     return Backdrop(cylinder, np.stack(images), np.stack([*masks, left]))
+
+
+def _union(
+    regions: Mapping[str, Float[Array, " v"]], names: tuple[str, ...], shape: tuple[int, ...]
+) -> Float[Array, " v"]:
+    masks = [check_array(name, regions[name], shape) for name in names if name in regions]
+    union: Array = np.max([np.zeros(shape), *masks], axis=0)
+    return union
 
 
 def _within(blend: Blend, surface: SurfaceMap, mesh: Mesh, mask: Float[Array, " v"]) -> Blend:

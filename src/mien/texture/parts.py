@@ -52,11 +52,13 @@ STYLES = {
 }
 
 # Regions of the skin (soft masks by name) whose holes are filled from the region itself: hair must
-# not run into the neck, nor an ear's pink into the hair behind it.
-FILLED_ALONE = ("left_ear", "right_ear", "scalp", "neck")
+# not run into the neck, nor an ear's pink into the hair behind it. EARS stand out from the head, so
+# that what lies around them on the cylinder does not lie beside them.
+EARS = ("left_ear", "right_ear")
+FILLED_ALONE = (*EARS, "scalp", "neck")
 
-# Regions of the skin that photos of a closed mouth do not show, and their plain colours.
-REGION_COLOURS = {"mouth_cavity": (92, 40, 40)}
+# Regions of the skin that photos do not show (mouth and nostrils inside), and their plain colours.
+REGION_COLOURS = {"mouth_cavity": (58, 26, 24)}
 
 # Parts that are so thin or so loosely modelled that they must not hide what is behind them.
 SEE_THROUGH = ("lashes", "hair")
