@@ -71,7 +71,7 @@ class Build:
         return (*self.capture.notes, *left_out, *fitted)
 
 
-def build(
+def build_head(
     source: str | Path,
     *,
     options: BuildOptions | None = None,
@@ -87,6 +87,7 @@ def build(
     capture = load_capture(
         source,
         face=options.face,
+        frames=options.frames,
         progress=lambda done, total: tell("Finding faces", done, total),
     )
     if NEUTRAL not in capture.expressions:
@@ -173,14 +174,14 @@ def build_head_folder(
     options: BuildOptions | None = None,
     progress: Progress | None = None,
 ) -> Build:
-    """As build, and written as a head folder with its report and a turntable video.
+    """As build_head, and written as a head folder with its report and a turntable video.
 
-    Raises: as build; InputError: the place holds something that is no head folder, or cannot be
-        written. Whatever was there stays until the new folder is whole.
+    Raises: as build_head; InputError: the place holds something that is no head folder, or cannot
+        be written. Whatever was there stays until the new folder is whole.
     """
     tell = progress or (lambda stage, done, total: None)
     check_head_place(folder)
-    result = build(source, options=options, progress=progress)
+    result = build_head(source, options=options, progress=progress)
     stage = "Writing the head"
     with atomic_folder(folder, replaces=is_head_folder) as place:
         tell(stage, 0, 3)

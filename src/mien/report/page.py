@@ -95,12 +95,15 @@ def _residual(mark: Mark) -> dict[str, Any]:
 
 
 def head_angles(camera: Camera) -> tuple[float, float, float]:
-    """Degrees of yaw, pitch and roll of the head before the camera, signs as in conventions.md."""
-    facing = camera.R_cam_head @ np.array([0.0, 0.0, -1.0])
-    up = camera.R_cam_head @ np.array([0.0, -1.0, 0.0])
-    yaw = np.degrees(np.arctan2(-facing[0], facing[2]))
-    pitch = np.degrees(np.arcsin(np.clip(-facing[1], -1, 1)))
-    roll = np.degrees(np.arctan2(up[0], up[1]))
+    """Degrees of yaw, pitch and roll of the head before the camera, as docs/conventions.md has them.
+
+    The same three angles given to `mien render` show the head turned like that.
+    """
+    # The head's x (subject's left), y (up) and z (out of the face) as the camera has them.
+    left, up, out = camera.R_cam_head.T
+    yaw = np.degrees(np.arctan2(left[2], -out[2]))
+    pitch = np.degrees(np.arcsin(np.clip(-up[2], -1, 1)))
+    roll = np.degrees(np.arctan2(-up[0], -up[1]))
     return float(yaw), float(pitch), float(roll)
 
 
