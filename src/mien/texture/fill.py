@@ -88,9 +88,9 @@ class Backdrop:
     ) -> Float[Array, "n 3"]:
         """(N, 3) float32 of chosen texels."""
         points = surface.points[texels]
+        shares = over_vertices(surface, mesh, self.masks.T)[texels]
         total = np.zeros((len(points), 3), np.float32)
-        for image, mask in zip(self.images, self.masks, strict=True):
-            share = over_vertices(surface, mesh, mask, texels)
+        for image, share in zip(self.images, shares.T, strict=True):
             inside = share > 1e-3
             seen = on_cylinder(image, self.cylinder, points[inside])
             total[inside] += share[inside, None] * seen
@@ -179,6 +179,5 @@ def _union(
 
 def _within(blend: Blend, surface: SurfaceMap, mesh: Mesh, mask: Float[Array, " v"]) -> Blend:
     """The blend with nothing known outside a region, nor on its soft border."""
-    inside = np.zeros(surface.mask.shape, np.float32)
-    inside[surface.mask] = over_vertices(surface, mesh, mask, surface.mask)
-    return replace(blend, confidence=blend.confidence * (inside > 0.9))
+    inside = over_vertices(surface, mesh, mask[:, None])[..., 0] > 0.9
+    return replace(blend, confidence=blend.confidence * inside)

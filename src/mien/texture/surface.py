@@ -56,12 +56,11 @@ def surface_from(
 
 
 def over_vertices(
-    surface: SurfaceMap, mesh: Mesh, values: Float[Array, " v"], texels: Bool[Array, "h w"]
-) -> Float[Array, " n"]:
-    """Values at the mesh's vertices, interpolated at chosen texels."""
-    corners = np.asarray(values, np.float32)[mesh.triangles[surface.triangle_ids[texels]]]
-    inside: Array = np.einsum("nc,nc->n", corners, surface.barycentrics[texels])
-    return inside
+    surface: SurfaceMap, mesh: Mesh, values: Float[Array, "v c"]
+) -> Float[Array, "h w c"]:
+    """Values at the mesh's vertices, interpolated over the texels; zero where there is none."""
+    raster = Raster(surface.triangle_ids, surface.barycentrics, np.empty((0, 0), np.float32))
+    return interpolate(raster, mesh.triangles, values)
 
 
 def parts_of(surface: SurfaceMap, mesh: Mesh, *names: str) -> Bool[Array, "h w"]:
