@@ -90,7 +90,7 @@ def adjust_bundle(
         cameras: K starts, from recover_pose. points: (N, 3) mm start.
         image_points: (K, N, 2) px, NaN where unseen.
         sigma_px: standard deviation of an observation per axis, one number or (K, N).
-        loss: "linear", "huber" or "cauchy", bending beyond one sigma or so.
+        loss: "linear", "huber" or "cauchy", for observations of which some are wrong.
         shape_prior, focal_prior: as the classes say; absent means nothing known.
         focal_group: (K,) photos with the same number share their focal length.
         marginal: with a shape prior, find the cameras of highest probability over all places
