@@ -40,7 +40,7 @@ def convergence_plot(head: FeatureHead, scenes: int = 12) -> None:
             label = name if seed == 0 else None
             axes.loglog(counts, np.sqrt(costs / best) - 1, color=colour, lw=1, label=label)
     axes.axhline(0.05, color="black", lw=0.8, ls=":")
-    axes.text(1, 0.055, "1.05 times the optimum", fontsize=8, va="bottom")
+    axes.text(150, 0.055, "1.05 times the optimum", fontsize=8, va="bottom", ha="right")
     axes.set(xlabel="sweeps of five steps", ylabel="RMS error over the optimum's, less 1")
     axes.set_ylim(1e-5, 10)
     axes.legend(frameon=False)
