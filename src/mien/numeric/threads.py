@@ -1,8 +1,8 @@
 """Work on rows of an image, shared by threads; the result never depends on how many.
 
 The kernels are Numba functions compiled with `nogil`, called on bands of rows from a pool of
-Python threads. Numba's own `parallel=True` takes longer to compile, and its default threading layer must
-not be entered by two threads at once.
+Python threads. Numba's own `parallel=True` takes longer to compile, and its default threading
+layer must not be entered by two threads at once.
 """
 
 from __future__ import annotations

@@ -108,13 +108,6 @@ def with_cylinder_uvs(mesh: Mesh, cylinder: Cylinder) -> Mesh:
     return replace(mesh, uvs=corners.reshape(-1, 2), uv_triangles=indices)
 
 
-def cylinder_radius(surface: SurfaceMap, cylinder: Cylinder) -> Float[Array, "h w"]:
-    """(H, W) mm: distance of every texel's point from the axis; zero where there is none."""
-    offsets = surface.points - np.array([cylinder.axis_x, 0, cylinder.axis_z], np.float32)
-    radius: Array = np.hypot(offsets[..., 0], offsets[..., 2]) * surface.mask
-    return radius
-
-
 @njit(cache=True, nogil=True)
 def _columns(a: Array, b: Array, c: Array, width: int) -> tuple[int, int]:
     """First and last column (perhaps beyond the ends) whose rays can meet the triangle."""
@@ -136,6 +129,47 @@ def _columns(a: Array, b: Array, c: Array, width: int) -> tuple[int, int]:
 
 
 @njit(cache=True, nogil=True)
+def _cast_triangle(
+    a: Array,
+    b: Array,
+    c: Array,
+    t: int,
+    columns: tuple[int, int],
+    row: int,
+    height: float,
+    sines: Array,
+    cosines: Array,
+    ids: Array,
+    barycentrics: Array,
+    radius: Array,
+) -> None:
+    """Write triangle t into one row where it is the outermost so far."""
+    width = len(sines)
+    ya, yb, yc = a[1] - height, b[1] - height, c[1] - height
+    # Triple products of the ray with two corners: coefficients of its sine and cosine. Both
+    # triangles at an edge get the same number with opposite signs: no gaps.
+    s0, c0 = yb * c[2] - b[2] * yc, b[0] * yc - yb * c[0]
+    s1, c1 = yc * a[2] - c[2] * ya, c[0] * ya - yc * a[0]
+    s2, c2 = ya * b[2] - a[2] * yb, a[0] * yb - ya * b[0]
+    for turn in range(columns[0], columns[1] + 1):
+        col = turn % width
+        sine, cosine = sines[col], cosines[col]
+        e0, e1, e2 = sine * s0 + cosine * c0, sine * s1 + cosine * c1, sine * s2 + cosine * c2
+        total = e0 + e1 + e2
+        if total == 0.0 or min(e0 * total, e1 * total, e2 * total) < 0.0:
+            continue
+        x = (e0 * a[0] + e1 * b[0] + e2 * c[0]) / total
+        z = (e0 * a[2] + e1 * b[2] + e2 * c[2]) / total
+        r = np.float32(x * sine + z * cosine)
+        if r > 0 and r > radius[row, col]:
+            radius[row, col] = r
+            ids[row, col] = t
+            barycentrics[row, col, 0] = e0 / total
+            barycentrics[row, col, 1] = e1 / total
+            barycentrics[row, col, 2] = e2 / total
+
+
+@njit(cache=True, nogil=True)
 def _cast_rows(
     points: Array,
     triangles: Array,
@@ -148,7 +182,7 @@ def _cast_rows(
     barycentrics: Array,
     radius: Array,
 ) -> None:
-    width, count = len(sines), len(heights)
+    count = len(heights)
     step = (heights[0] - heights[count - 1]) / max(count - 1, 1)
     for t in range(triangles.shape[0]):
         a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
@@ -157,31 +191,7 @@ def _cast_rows(
         bottom = min(int(np.ceil((heights[0] - lowest) / step)), end - 1)
         if top > bottom:
             continue
-        left, right = _columns(a, b, c, width)
+        columns = _columns(a, b, c, len(sines))
         for row in range(top, bottom + 1):
-            ya, yb, yc = a[1] - heights[row], b[1] - heights[row], c[1] - heights[row]
-            # Triple products of the ray with two corners: coefficients of its sine and cosine.
-            # Both triangles at an edge get the same number with opposite signs: no gaps.
-            s0, c0 = yb * c[2] - b[2] * yc, b[0] * yc - yb * c[0]
-            s1, c1 = yc * a[2] - c[2] * ya, c[0] * ya - yc * a[0]
-            s2, c2 = ya * b[2] - a[2] * yb, a[0] * yb - ya * b[0]
-            for turn in range(left, right + 1):
-                col = turn % width
-                sine, cosine = sines[col], cosines[col]
-                e0 = sine * s0 + cosine * c0
-                e1 = sine * s1 + cosine * c1
-                e2 = sine * s2 + cosine * c2
-                if not ((e0 >= 0 and e1 >= 0 and e2 >= 0) or (e0 <= 0 and e1 <= 0 and e2 <= 0)):
-                    continue
-                total = e0 + e1 + e2
-                if total == 0.0:
-                    continue
-                x = (e0 * a[0] + e1 * b[0] + e2 * c[0]) / total
-                z = (e0 * a[2] + e1 * b[2] + e2 * c[2]) / total
-                r = np.float32(x * sine + z * cosine)
-                if r > 0 and r > radius[row, col]:
-                    radius[row, col] = r
-                    ids[row, col] = t
-                    barycentrics[row, col, 0] = e0 / total
-                    barycentrics[row, col, 1] = e1 / total
-                    barycentrics[row, col, 2] = e2 / total
+            y = heights[row]
+            _cast_triangle(a, b, c, t, columns, row, y, sines, cosines, ids, barycentrics, radius)

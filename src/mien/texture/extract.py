@@ -100,19 +100,7 @@ def extract_texture(
     """
     job = _prepare(mesh, cameras, photos, surface, feather_mm, fill, find_subject)
     job = replace(job, certainty_power=certainty_power)
-    skin = ("skin",) if "skin" in mesh.part_names else mesh.part_names
-    width, height = _COARSE
-    coarse = cylinder_surface(mesh, job.cylinder, width=width, height=height, parts=skin)
-    if equalize:
-        job = replace(job, gains=estimate_gains(coarse, job.views, feather_mm=feather_mm))
-    around = _blend(job, coarse, SKIN)
-    if not around.coverage.any():
-        raise EstimationError("no photo sees the head where its camera says it is")
-    if mirror is not None:
-        difference = mirror_difference(around, _blend(job, mirrored(coarse, mesh, mirror), SKIN))
-        job = replace(job, mirror=mirror, mirror_difference=difference)
-        around = _blend(job, coarse, SKIN)
-    backdrop = make_backdrop(coarse, mesh, around, job.cylinder, fill, regions or {})
+    job, backdrop = _look_around(job, equalize, mirror, regions or {})
     pixels = _background(surface, backdrop)
     coverage = np.zeros(surface.triangle_ids.shape, np.float32)
     for name in mesh.part_names:
@@ -128,6 +116,28 @@ def extract_texture(
     if fill != "none" and not surface.wrap:
         result = fill_gutters(result, surface.mask)
     return Texture(result, coverage, job.gains)
+
+
+def _look_around(
+    job: _Job,
+    equalize: bool,
+    mirror: Int[Array, " v"] | None,
+    regions: Mapping[str, Float[Array, " v"]],
+) -> tuple[_Job, Backdrop]:
+    """What is learned on a coarse cylinder: gains, the sides' difference, what fills the holes."""
+    mesh, (width, height) = job.mesh, _COARSE
+    skin = ("skin",) if "skin" in mesh.part_names else mesh.part_names
+    coarse = cylinder_surface(mesh, job.cylinder, width=width, height=height, parts=skin)
+    if equalize:
+        job = replace(job, gains=estimate_gains(coarse, job.views, feather_mm=job.feather_mm))
+    around = _blend(job, coarse, SKIN)
+    if not around.coverage.any():
+        raise EstimationError("no photo sees the head where its camera says it is")
+    if mirror is not None:
+        difference = mirror_difference(around, _blend(job, mirrored(coarse, mesh, mirror), SKIN))
+        job = replace(job, mirror=mirror, mirror_difference=difference)
+        around = _blend(job, coarse, SKIN)
+    return job, make_backdrop(coarse, mesh, around, job.cylinder, job.fill, regions)
 
 
 def _prepare(

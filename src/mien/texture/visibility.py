@@ -237,6 +237,18 @@ def project_point(pose: Array, x: float, y: float, z: float) -> tuple[float, flo
 
 
 @njit(cache=True, nogil=True)
+def _is_shown(depth_map: Array, usable: Array, x: float, y: float, nearest: float) -> bool:
+    """Whether all four pixels that a lookup reads are usable and none shows anything nearer."""
+    height, width = depth_map.shape
+    x0, x1, y0, y1, _, _ = bilinear_place(x, y, width, height)
+    for row in (y0, y1):
+        for col in (x0, x1):
+            if not usable[row, col] or depth_map[row, col] < nearest:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True)
 def _see_rows(
     points: Array,
     normals: Array,
@@ -268,12 +280,5 @@ def _see_rows(
                 continue
             # Within a pixel the depth changes by its width times the tangent of the tilt.
             slope = np.sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine
-            slack = tolerance + slope * depth / pose[12]
-            x0, x1, y0, y1, _, _ = bilinear_place(px, py, width, height)
-            # A bilinear lookup reads four pixels, and all of them must be good.
-            nearest = min(depth_map[y0, x0], depth_map[y0, x1])
-            nearest = min(nearest, depth_map[y1, x0], depth_map[y1, x1])
-            if depth - nearest > slack:
-                continue
-            if usable[y0, x0] and usable[y0, x1] and usable[y1, x0] and usable[y1, x1]:
-                visible[row, col] = 1
+            nearest = depth - tolerance - slope * depth / pose[12]
+            visible[row, col] = _is_shown(depth_map, usable, px, py, nearest)
