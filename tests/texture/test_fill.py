@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,8 @@ from mien.texture.blend import Blend
 from mien.texture.cylinder import cylinder_surface, fit_cylinder
 from mien.texture.fill import fill_image, fill_part, make_backdrop, mix, over
 from mien.texture.parts import REGION_COLOURS
-from shapes import ellipsoid
+from mien.texture.surface import parts_of
+from shapes import ellipsoid, with_nose
 
 
 def uniform(colour: tuple[int, int, int], confidence: Array) -> Blend:
@@ -79,3 +82,18 @@ def test_a_mask_of_another_mesh_is_refused() -> None:
     blend = uniform((1, 2, 3), coarse.mask)
     with pytest.raises(InputError, match=r"scalp: expected shape \(3321\), got shape \(5,\)"):
         make_backdrop(coarse, mesh, blend, cylinder, "pyramid", {"scalp": np.zeros(5)})
+
+
+def test_the_hair_cap_takes_the_colours_of_the_scalp() -> None:
+    mesh = with_nose(ellipsoid())
+    hairy = replace(mesh, part_names=("skin", "hair"))
+    cylinder = fit_cylinder(hairy)
+    coarse = cylinder_surface(hairy, cylinder, width=128, height=64, parts=("skin",))
+    scalp = np.clip((mesh.vertices[:, 1] - 30) / 10, 0, 1)
+    blend = uniform((180, 130, 110), coarse.mask)
+    blend.colours[coarse.points[..., 1] > 35] = (30, 25, 20)
+    backdrop = make_backdrop(coarse, hairy, blend, cylinder, "pyramid", {"scalp": scalp})
+    surface = atlas_surface(hairy, width=200, height=80)
+    hair = parts_of(surface, hairy, "hair")
+    colours = backdrop.colours(surface, hairy, hair)
+    np.testing.assert_allclose(colours, [[30, 25, 20]] * hair.sum(), atol=1e-3)

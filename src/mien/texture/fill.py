@@ -146,6 +146,7 @@ def make_backdrop(
     Raises: InputError: a mask that does not fit the mesh.
     """
     left = np.ones(len(mesh.vertices))
+    regions = _with_hair(mesh, regions)
     images, masks = [], []
     for name, colour in REGION_COLOURS.items():
         if name in regions:
@@ -167,6 +168,17 @@ def make_backdrop(
     rest = _within(blend, coarse, mesh, 1 - ears)
     images.append(fill_image(rest if rest.confidence.any() else blend, fill, wrap=True))
     return Backdrop(cylinder, np.stack(images), np.stack([*masks, left]))
+
+
+def _with_hair(
+    mesh: Mesh, regions: Mapping[str, Float[Array, " v"]]
+) -> Mapping[str, Float[Array, " v"]]:
+    """The hair cap has the scalp's colours."""
+    if "hair" not in mesh.part_names or "scalp" not in regions:
+        return regions
+    scalp = check_array("scalp", regions["scalp"], (len(mesh.vertices),)).copy()
+    scalp[mesh.triangles[mesh.triangles_of("hair")]] = 1
+    return {**regions, "scalp": scalp}
 
 
 def _union(
