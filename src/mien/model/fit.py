@@ -22,9 +22,9 @@ FOCAL_PRIOR_DIAGONALS = 1.7
 """Without EXIF: a focal length between a phone's (0.6 diagonals) and a cropped portrait's (3.5)."""
 FOCAL_PRIOR_DEVIATION = 0.6
 EXIF_DEVIATION = 0.05
-NAMED_SIGMA_MM = 5.0
-"""How far a named point lies off the identity basis, each axis: what a name means differs between
-faces and people who mark them, and these errors go together (docs/pose-recovery.md)."""
+NAMED_SIGMA_MM = 2.0
+"""How far a marked point lies off the identity basis, each axis: what a name means differs between
+faces and between people who mark them (docs/pose-recovery.md)."""
 ATTACHED_SIGMA_MM = 1.5
 """The same for a landmark: the detector that finds it also attached it to the generic head."""
 PRIOR_DEVIATION_MM = 2.5
