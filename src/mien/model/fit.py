@@ -11,6 +11,7 @@ from mien.arrays import Array, Bool, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.source import View
+from mien.errors import EstimationError
 from mien.model.adjust import Adjustment, FocalPrior, ShapePrior, adjust_bundle
 from mien.model.deform import eye_centers, vertex_uncertainty
 from mien.model.features import Features, gather_features, rematch_curves
@@ -163,12 +164,16 @@ def _solve(
     views: Sequence[View], features: Features, generic: GenericHead, options: FitOptions
 ) -> _Solution:
     """P02's five steps, then as often as asked for: curves, joint adjustment or rays, shape."""
-    start = recover_pose(
-        features.image_points,
-        features.on(generic.mesh.vertices),
-        np.array([view.photo.size for view in views]),
-        weights=1 / features.sigma_mm**2,
-    )
+    try:
+        start = recover_pose(
+            features.image_points,
+            features.on(generic.mesh.vertices),
+            np.array([view.photo.size for view in views]),
+            weights=1 / features.sigma_mm**2,
+        )
+    except EstimationError as error:
+        names = ", ".join(view.photo.name for view in views)
+        raise EstimationError(f"{names}: {error}") from None
     problems = {
         view.photo.name: text for view, text in zip(views, start.problems, strict=True) if text
     }
