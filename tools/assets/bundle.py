@@ -16,6 +16,7 @@ from tools.assets.identity import principal_modes, sample_heads
 from tools.assets.makehuman import MakeHuman
 from tools.assets.regions import build_regions
 from tools.assets.shading import paint_head
+from tools.assets.skull import follow_with_scalp
 from tools.assets.triangles import triangulate
 from tools.assets.units import build_units
 
@@ -42,7 +43,7 @@ def build_arrays(source: MakeHuman, model: bytes) -> dict[str, Array]:
         **_mesh_arrays(mesh),
         "mirror": head.mirror.astype(np.uint16),
         **_unit_arrays(*build_units(source, head, polylines)),
-        "identity_components": _identity(source, head, mesh, regions["face"]).astype(np.float16),
+        "identity_components": _identity(source, head, mesh, regions).astype(np.float16),
         "region_names": np.array(list(regions)),
         "regions": np.stack(list(regions.values())),
         "point_names": np.array(list(points)),
@@ -91,10 +92,13 @@ def _unit_arrays(names: tuple[str, ...], offsets: Float[Array, "52 v 3"]) -> dic
 
 
 def _identity(
-    source: MakeHuman, head: HeadCut, mesh: Mesh, face: Float[Array, " v"]
+    source: MakeHuman, head: HeadCut, mesh: Mesh, regions: dict[str, Array]
 ) -> Float[Array, "k v 3"]:
     """The identity components at the amplitude of real heads."""
+    face = regions["face"]
+    hidden = regions["mouth_cavity"] + regions["eye_socket"]
     heads = sample_heads(source, head, _HEADS, np.random.default_rng(_SEED))
+    heads = follow_with_scalp(heads, head, regions["scalp"], hidden)
     population = principal_modes(heads, head, 0.05 + face.astype(np.float64), _MODES)
     on_face = mesh.triangles[(face[mesh.triangles] > 0.05).all(1)]
     amplitude = find_amplitude(
