@@ -90,6 +90,7 @@ def build_head(
         frames=options.frames,
         progress=lambda done, total: tell("Finding faces", done, total),
     )
+    capture = _named_by_expression(capture)
     if NEUTRAL not in capture.expressions:
         raise EstimationError(f"{source}: there is no folder called {NEUTRAL} among its folders")
     fits: dict[str, Fit] = {}
@@ -100,6 +101,20 @@ def build_head(
     head = _head(capture, fits, generic)
     textures, coverage = _extract_textures(head, capture, options, tell)
     return Build(replace(head, textures=textures), capture, fits, coverage)
+
+
+def _named_by_expression(capture: Capture) -> Capture:
+    """Where there are expression folders, photos are EXPRESSION/PHOTO: names may repeat in them."""
+    if list(capture.expressions) == [NEUTRAL]:
+        return capture
+    expressions = {
+        name: tuple(
+            replace(view, photo=replace(view.photo, name=f"{name}/{view.photo.name}"))
+            for view in views
+        )
+        for name, views in capture.expressions.items()
+    }
+    return replace(capture, expressions=expressions)
 
 
 def _head(capture: Capture, fits: dict[str, Fit], generic: GenericHead) -> Head:
@@ -190,7 +205,7 @@ def build_head_folder(
         write_head(result.head, place, photos=used)
         for view in result.capture.views:
             if view.annotations:
-                file = place / "annotations" / f"{view.photo.stem}.json"
+                file = (place / "annotations" / view.photo.name).with_suffix(".json")
                 save_annotations(file, view.photo, view.annotations)
         tell(stage, 1, 3)
         write_video(place / TURNTABLE, turntable_frames(result.head), fps=24)
