@@ -1,0 +1,116 @@
+"""The command line, run in this process, and a head that it built once."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import shutil
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mien.app.cli import main
+from mien.app.demo import demo_photos
+from mien.arrays import Array
+from mien.build import Build, build_head
+from mien.texture.cylinder import cylinder_surface
+from terminal import FAST, SHORT_TURNTABLE, Built, Mien, Ran
+
+SIZE = (375, 500)
+
+
+@pytest.fixture
+def mien(capfd: pytest.CaptureFixture[str]) -> Mien:
+    """mien("build", source, ...) as in a terminal; what libraries print themselves counts."""
+
+    def run(*arguments: object) -> Ran:
+        capfd.readouterr()
+        status = main([str(argument) for argument in arguments])
+        return Ran(status, *capfd.readouterr())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    """James from small photos. Read only: other tests use it too."""
+    place = tmp_path_factory.mktemp("built")
+    source = small_james(place / "james")
+    out, err = io.StringIO(), io.StringIO()
+    results: list[Build] = []
+
+    def remember(*arguments: Any, **options: Any) -> Build:
+        results.append(build_head(*arguments, **options))
+        return results[0]
+
+    with contextlib.ExitStack() as stack:
+        patch = stack.enter_context(pytest.MonkeyPatch.context())
+        patch.setattr("mien.build.build_head", remember)
+        patch.setattr("mien.build.turntable_frames", SHORT_TURNTABLE)
+        stack.enter_context(contextlib.redirect_stdout(out))
+        stack.enter_context(contextlib.redirect_stderr(err))
+        status = main(["build", str(source), "-o", str(place / "head"), *FAST, "--json"])
+    assert status == 0, err.getvalue()
+    summary = Ran(status, out.getvalue(), err.getvalue()).json
+    return Built(source, place / "head", results[0], summary)
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Builds whose turntable and cylinder, the slowest stages, are small."""
+    monkeypatch.setattr("mien.build.turntable_frames", SHORT_TURNTABLE)
+    monkeypatch.setattr(
+        "mien.build.cylinder_surface", partial(cylinder_surface, width=128, height=64)
+    )
+
+
+@pytest.fixture
+def rebuilt(built: Built, monkeypatch: pytest.MonkeyPatch, quick: None) -> None:
+    """Builds that only write: what they write was computed before."""
+    monkeypatch.setattr("mien.build.build_head", lambda source, **options: built.result)
+
+
+@pytest.fixture
+def james(tmp_path: Path) -> Path:
+    """A folder of the two small photos and their marks, to do what one likes with."""
+    return small_james(tmp_path / "james")
+
+
+@pytest.fixture
+def bare_james(james: Path) -> Path:
+    """The same without marks."""
+    shutil.rmtree(james / "annotations")
+    return james
+
+
+def small_james(folder: Path) -> Path:
+    """The photos that ship with mien, a third as large, and the marks as they are."""
+    (folder / "annotations").mkdir(parents=True)
+    for side in ("left", "right"):
+        photo = Image.open(demo_photos() / f"photo_{side}.png").convert("RGB")
+        photo.resize(SIZE, Image.Resampling.LANCZOS).save(folder / f"{side}.png")
+        marks = demo_photos() / "annotations" / f"photo_{side}.json"
+        shutil.copy(marks, folder / "annotations" / f"{side}.json")
+    return folder
+
+
+@pytest.fixture
+def wall() -> Array:
+    """(400, 300, 3) a picture without a face."""
+    return np.tile(np.linspace(0, 255, 400).astype(np.uint8)[:, None, None], (1, 300, 3))
+
+
+@pytest.fixture
+def contents() -> Iterator[Callable[[Path], dict[str, bytes]]]:
+    """All files of a folder, hidden ones too, by relative path."""
+
+    def read(folder: Path) -> dict[str, bytes]:
+        files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+        return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+    return read
