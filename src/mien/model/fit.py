@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mien.arrays import Array, Bool, Float
+from mien.arrays import Array, Bool, Float, Int
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.source import View
@@ -99,7 +99,6 @@ class FitOptions:
         curves: "epipolar" or "arc-length", how drawn curves become points (P02 sec. 5.1.3).
         kernel: radial basis of the deformation (numeric.rbf).
         interpupillary_mm: measured distance between the pupils, which sets the scale.
-        one_camera: all photos come from one lens at one zoom, as a video's frames do.
         rounds: times that curves and shape are refined.
     """
 
@@ -107,7 +106,6 @@ class FitOptions:
     curves: str = "epipolar"
     kernel: str = "exponential"
     interpupillary_mm: float = 63.0
-    one_camera: bool = False
     rounds: int = 2
 
 
@@ -187,7 +185,7 @@ def _solve(
         if options.curves == "epipolar":
             features = rematch_curves(features, views, cameras, generic)
         if options.adjust:
-            adjusted = _adjust(views, features, cameras, points, generic, options)
+            adjusted = _adjust(views, features, cameras, points, generic)
             cameras, points, deviation = adjusted.cameras, adjusted.points, adjusted.point_sd_mm
         else:
             points, deviation = _intersect(features, cameras, features.on(vertices))
@@ -203,7 +201,6 @@ def _adjust(
     cameras: tuple[Camera, ...],
     points: Float[Array, "n 3"],
     generic: GenericHead,
-    options: FitOptions,
 ) -> Adjustment:
     """Cameras and points of highest posterior under the identity prior."""
     by_hand = features.by_hand.any(axis=0)
@@ -220,7 +217,7 @@ def _adjust(
         loss="cauchy",
         shape_prior=prior,
         focal_prior=_focal_prior(views),
-        focal_group=np.zeros(len(cameras), int) if options.one_camera else None,
+        focal_group=_lenses(views),
     )
 
 
@@ -255,6 +252,12 @@ def _focal_prior(views: Sequence[View]) -> FocalPrior:
     ]
     deviation = [FOCAL_PRIOR_DEVIATION if exif is None else EXIF_DEVIATION for exif in known]
     return FocalPrior(np.array(focal), np.array(deviation))
+
+
+def _lenses(views: Sequence[View]) -> Int[Array, " k"]:
+    """(K,) the same number for photos of one lens: the frames of a video."""
+    files = [view.photo.path for view in views]
+    return np.array([files.index(file) for file in files])
 
 
 def _misfit(solution: _Solution) -> dict[str, str] | None:
