@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from mien.app.options import parse_amounts, parse_colour, parse_size
+from mien.app.options import check_finite, parse_amounts, parse_colour, parse_size
 from mien.app.progress import terminal_progress
 from mien.errors import MienError
 
@@ -23,6 +23,7 @@ app = typer.Typer(
 )
 
 Curves = Literal["epipolar", "arc-length"]
+Kernel = Literal["exponential", "biharmonic", "triharmonic", "thin_plate"]
 FillChoice = Literal["pyramid", "grow"]
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, no bars.")]
@@ -59,7 +60,7 @@ def build(
         Curves, typer.Option(help="How drawn curves become points in the second photo and on.")
     ] = "epipolar",
     kernel: Annotated[
-        str, typer.Option(help="Radial basis of the deformation (docs/pose-recovery.md).")
+        Kernel, typer.Option(help="Radial basis of the deformation; the first is P02's.")
     ] = "exponential",
     fill: Annotated[
         FillChoice, typer.Option(help="How texture that no photo shows is filled.")
@@ -124,12 +125,16 @@ def render(
 
     width_height = parse_size("--size", size)
     units = parse_amounts("--unit", unit or [])
+    angles = [
+        radians(check_finite(name, angle))
+        for name, angle in (("--yaw", yaw), ("--pitch", pitch), ("--roll", roll))
+    ]
     colour = None if background is None else parse_colour("--background", background)
     picture = render_head(
         load_head(head),
-        yaw=radians(yaw),
-        pitch=radians(pitch),
-        roll=radians(roll),
+        yaw=angles[0],
+        pitch=angles[1],
+        roll=angles[2],
         size=width_height,
         photo=camera,
         units=units,
@@ -155,29 +160,24 @@ def main(arguments: list[str] | None = None) -> int:
     debug = "--debug" in arguments
     arguments = [argument for argument in arguments if argument != "--debug"]
     try:
-        app(args=arguments, prog_name="mien", standalone_mode=False)
-    except (MienError, OSError) as error:
-        return _fail(error, debug)
-    except typer.Exit as stop:
-        return int(stop.exit_code)
-    except (typer.Abort, KeyboardInterrupt):
-        return 130
+        # An interrupted command comes back as its exit status, a finished one as None.
+        return app(args=arguments, prog_name="mien", standalone_mode=False) or 0
     except Exception as error:
-        # Click's own complaints (an unknown option, a missing argument) carry an exit code;
-        # anything else is a bug and keeps its traceback only on request.
-        if hasattr(error, "format_message"):
-            return _fail(error.format_message(), debug)
-        return _fail(
-            f"internal error: {type(error).__name__}: {error} (--debug shows where)", debug
-        )
-    return 0
+        if debug:
+            raise
+        print("error:", _one_line(error), file=sys.stderr)
+        return 2
 
 
-def _fail(error: object, debug: bool) -> int:
-    if debug and isinstance(error, Exception):
-        raise error
-    print("error:", " ".join(str(error).split()), file=sys.stderr)
-    return 2
+def _one_line(error: Exception) -> str:
+    # Click's own complaints (an unknown option, a missing argument) format themselves.
+    if hasattr(error, "format_message"):
+        text = error.format_message()
+    elif isinstance(error, (MienError, OSError)):
+        text = str(error)
+    else:
+        text = f"internal error: {type(error).__name__}: {error} (--debug shows where)"
+    return " ".join(text.split())
 
 
 def _print(as_json: bool, data: dict[str, Any], text: str) -> None:
