@@ -19,6 +19,8 @@ from mien.app.demo import demo_photos
 from mien.arrays import Array
 from mien.build import Build, build_head
 from mien.texture.cylinder import cylinder_surface
+from mien.texture.extract import Texture
+from mien.texture.surface import SurfaceMap
 from terminal import FAST, SHORT_TURNTABLE, Built, Mien, Ran
 
 SIZE = (375, 500)
@@ -67,6 +69,17 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         "mien.build.cylinder_surface", partial(cylinder_surface, width=128, height=64)
     )
+
+
+@pytest.fixture
+def untextured(monkeypatch: pytest.MonkeyPatch, quick: None) -> None:
+    """Builds of grey heads, where it is the photos and cameras that count."""
+
+    def grey(*arguments: object, surface: SurfaceMap, **options: object) -> Texture:
+        shape = surface.triangle_ids.shape
+        return Texture(np.full((*shape, 3), 128, np.uint8), np.ones(shape), np.ones((1, 3)))
+
+    monkeypatch.setattr("mien.build.extract_texture", grey)
 
 
 @pytest.fixture

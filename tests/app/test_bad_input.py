@@ -1,0 +1,229 @@
+"""Whatever is wrong with a source becomes one clear line, or a note, that names the file."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mien.arrays import Array
+from terminal import Built, Mien
+
+FACES = pytest.mark.usefixtures("untextured")
+SMALL = ("--texture-size", 64, "--json")
+
+
+def save(path: Path, pixels: Array) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(pixels).save(path)
+
+
+def remark(james: Path, side: str, **changed: Any) -> Path:
+    """Change what an annotation file says."""
+    path = james / "annotations" / f"{side}.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changed))
+    return path
+
+
+def pixels(path: Path) -> Array:
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+def test_no_such_folder(mien: Mien, tmp_path: Path) -> None:
+    error = mien("build", tmp_path / "nowhere", "-o", tmp_path / "head", "--json").error
+    assert error.startswith(f"{tmp_path / 'nowhere'}: expected ")
+    assert not (tmp_path / "head").exists()
+
+
+def test_a_folder_without_photos(mien: Mien, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    error = mien("build", tmp_path / "empty", "-o", tmp_path / "head", "--json").error
+    assert error.startswith(f"{tmp_path / 'empty'}: expected ")
+
+
+def test_a_photo_that_is_no_image(james: Path, mien: Mien, tmp_path: Path) -> None:
+    (james / "left.png").write_text("not a picture")
+    error = mien("build", james, "-o", tmp_path / "head", "--json").error
+    assert error.startswith(
+        f"{james / 'left.png'}: expected an image (JPEG, PNG, HEIC, ...), found"
+    )
+
+
+def test_a_truncated_jpeg(bare_james: Path, mien: Mien, tmp_path: Path) -> None:
+    photo = bare_james / "left.jpg"
+    Image.fromarray(pixels(bare_james / "left.png")).save(photo, quality=95)
+    photo.write_bytes(photo.read_bytes()[:4000])
+    error = mien("build", bare_james, "-o", tmp_path / "head", "--json").error
+    assert error.startswith(f"{photo}: expected a whole image, found a damaged one")
+
+
+def test_no_face(wall: Array, mien: Mien, tmp_path: Path) -> None:
+    save(tmp_path / "walls" / "wall.png", wall)
+    error = mien("build", tmp_path / "walls", "-o", tmp_path / "head", "--json").error
+    assert error.startswith(f"{tmp_path / 'walls'}: no photo shows a face")
+    assert "wall.png: left out: no face found" in error
+
+
+@FACES
+def test_a_photo_without_a_face_beside_good_ones(
+    james: Path, wall: Array, mien: Mien, tmp_path: Path
+) -> None:
+    save(james / "wall.png", wall)
+    summary = mien("build", james, "-o", tmp_path / "head", *SMALL).json
+    assert any(note.startswith("wall.png: left out: no face found") for note in summary["notes"])
+    assert len(summary["expressions"]["neutral"]) == 2
+
+
+@pytest.fixture
+def couple(bare_james: Path) -> Path:
+    """A photo of two faces: the right one in the picture is larger."""
+    left, right = (pixels(bare_james / f"{side}.png") for side in ("left", "right"))
+    canvas = np.zeros((500, 700, 3), np.uint8)
+    canvas[:400, :300] = np.asarray(Image.fromarray(left).resize((300, 400)))
+    canvas[:, 325:] = right
+    shutil.rmtree(bare_james)
+    save(bare_james / "couple.png", canvas)
+    return bare_james
+
+
+@FACES
+def test_of_several_faces_the_largest_is_taken_and_that_is_said(
+    couple: Path, mien: Mien, tmp_path: Path
+) -> None:
+    notes = mien("build", couple, "-o", tmp_path / "head", *SMALL).json["notes"]
+    assert "couple.png: 2 faces: number 2 from the left, the largest, is used" in notes
+    assert "one photo: depth comes from the prior of faces, not from this person" in notes
+
+
+@FACES
+def test_a_face_can_be_chosen(couple: Path, mien: Mien, tmp_path: Path) -> None:
+    taken = []
+    for face in (1, 2):
+        head = tmp_path / f"head{face}"
+        assert mien("build", couple, "-o", head, "--face", face, *SMALL).json
+        camera = json.loads((head / "head.json").read_text())["expressions"]["neutral"]["cameras"][
+            0
+        ]
+        x, _, z = camera["t_cam_head_mm"]
+        taken.append(camera["principal_px"][0] + camera["focal_px"] * x / z)
+    assert taken[0] < 325 < taken[1]
+
+
+def test_a_face_that_is_not_there(couple: Path, mien: Mien, tmp_path: Path) -> None:
+    error = mien("build", couple, "-o", tmp_path / "head", "--face", 3, "--json").error
+    assert error == "face: expected 1 to 2, the faces in couple.png, got 3"
+
+
+def test_faces_count_from_one(james: Path, mien: Mien, tmp_path: Path) -> None:
+    error = mien("build", james, "-o", tmp_path / "head", "--face", 0, "--json").error
+    assert "--face" in error
+
+
+@FACES
+def test_the_same_photo_twice(bare_james: Path, mien: Mien, tmp_path: Path) -> None:
+    shutil.copy(bare_james / "left.png", bare_james / "left_again.png")
+    summary = mien("build", bare_james, "-o", tmp_path / "head", *SMALL).json
+    assert "left_again.png: left out: the same photo as left.png" in summary["notes"]
+    assert len(summary["expressions"]["neutral"]) == 2
+
+
+@FACES
+def test_all_photos_from_one_viewpoint(bare_james: Path, mien: Mien, tmp_path: Path) -> None:
+    (bare_james / "right.png").unlink()
+    left = pixels(bare_james / "left.png")
+    save(bare_james / "again.png", np.roll(left, (9, -7), axis=(0, 1)))
+    summary = mien("build", bare_james, "-o", tmp_path / "head", *SMALL).json
+    notes = [note for note in summary["notes"] if "depth" in note]
+    print(summary["notes"])
+    assert notes
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ({"points": {"chin": [float("nan"), 5]}}, "points.chin"),
+        ({"points": {"chin": [1300, 5]}}, "points.chin"),
+        ({"points": {"chim": [5, 5]}}, "points.chim: unknown name"),
+        ({"curves": {"left_jaw": [[5, 5]]}}, "curves.left_jaw"),
+        ({"size": [1000, 1600]}, "size: expected 375x500"),
+    ],
+)
+def test_bad_annotations(
+    change: dict[str, Any], problem: str, james: Path, mien: Mien, tmp_path: Path
+) -> None:
+    path = remark(james, "left", **change)
+    error = mien("build", james, "-o", tmp_path / "head", "--json").error
+    assert error.startswith(f"{path}: {problem}")
+
+
+def test_annotations_that_are_no_json(james: Path, mien: Mien, tmp_path: Path) -> None:
+    path = james / "annotations" / "left.json"
+    path.write_text('{"points": ')
+    error = mien("build", james, "-o", tmp_path / "head", "--json").error
+    assert error.startswith(f"{path}: line 1, column 12: expected JSON")
+
+
+def test_fewer_points_than_unknowns(wall: Array, mien: Mien, tmp_path: Path) -> None:
+    source = tmp_path / "walls"
+    save(source / "wall.png", wall)
+    (source / "annotations").mkdir()
+    marks = {"chin": [150, 300], "nose_tip": [150, 200], "nose_root": [150, 150]}
+    (source / "annotations" / "wall.json").write_text(json.dumps({"points": marks}))
+    error = mien("build", source, "-o", tmp_path / "head", "--json").error
+    assert error == "wall.png: no photo fits: shows 3 points, needs 6"
+
+
+@FACES
+def test_marks_of_another_person_leave_the_photo_out(
+    james: Path, mien: Mien, tmp_path: Path
+) -> None:
+    """Marks that were shuffled: a photo that cannot be this head is named, not averaged in."""
+    path = james / "annotations" / "left.json"
+    points = json.loads(path.read_text())["points"]
+    names = list(points)
+    moved = dict(zip(names, [points[name] for name in names[1:] + names[:1]], strict=True))
+    remark(james, "left", points=moved, curves={})
+    summary = mien("build", james, "-o", tmp_path / "head", *SMALL).json
+    print(summary["left_out"], summary["notes"])
+    assert list(summary["left_out"]) == ["left.png"]
+    assert [item["photo"] for item in summary["expressions"]["neutral"]] == ["right.png"]
+
+
+@FACES
+def test_two_people(bare_james: Path, mien: Mien, tmp_path: Path) -> None:
+    """The same photos, one squeezed: no head in the world looks like that from there."""
+    left = Image.fromarray(pixels(bare_james / "left.png"))
+    save(bare_james / "squeezed.png", np.asarray(left.resize((375, 300))))
+    summary = mien("build", bare_james, "-o", tmp_path / "head", *SMALL).json
+    print(summary["left_out"], summary["notes"])
+
+
+def test_a_head_from_a_newer_version(built: Built, mien: Mien, tmp_path: Path) -> None:
+    head = shutil.copytree(built.folder, tmp_path / "head")
+    data = json.loads((head / "head.json").read_text())
+    (head / "head.json").write_text(json.dumps(data | {"version": data["version"] + 1}))
+    for command in (
+        ["render", head, "-o", tmp_path / "x.png"],
+        ["export", head, "-o", tmp_path / "x.glb"],
+    ):
+        error = mien(*command).error
+        assert error.startswith(f"{head / 'head.json'}: version: ")
+        assert "newer" in error
+
+
+@pytest.mark.parametrize("what", ["nothing", "file", "folder"])
+def test_what_is_no_head(what: str, mien: Mien, tmp_path: Path) -> None:
+    head = tmp_path / "head"
+    if what == "file":
+        head.write_text("x")
+    elif what == "folder":
+        head.mkdir()
+    error = mien("render", head, "-o", tmp_path / "x.png").error
+    assert error.startswith(str(head))
+    assert not (tmp_path / "x.png").exists()
