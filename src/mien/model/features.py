@@ -59,6 +59,12 @@ class Features:
         )
         return places
 
+    def sigma_px(self, cameras: Sequence[Camera]) -> Float[Array, "k n"]:
+        """(K, N) px: the observations' deviations as these cameras see them; inf where unseen."""
+        px_per_mm = [camera.focal_px / camera.t_cam_head[2] for camera in cameras]
+        sigma: Array = self.sigma_mm * np.array(px_per_mm)[:, None]
+        return sigma
+
     def of_photos(self, keep: Bool[Array, " k"]) -> Features:
         """Only these photos; features that none of them shows are dropped."""
         image, sigma = self.image_points[keep], self.sigma_mm[keep]

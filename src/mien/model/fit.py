@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mien.arrays import Array, Bool, Float, Int
+from mien.arrays import Array, Float, Int
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.source import View
@@ -18,6 +18,7 @@ from mien.model.features import Features, gather_features, rematch_curves
 from mien.model.pose import recover_pose
 from mien.model.rays import intersect_rays
 from mien.model.shape import shape_from_features
+from mien.model.verdict import PhotoFit, depth_notes, find_misfit, judge_marks
 
 FOCAL_PRIOR_DIAGONALS = 1.7
 """Without EXIF: a focal length between a phone's (0.6 diagonals) and a cropped portrait's (3.5)."""
@@ -30,44 +31,6 @@ ATTACHED_SIGMA_MM = 1.5
 """The same for a landmark: the detector that finds it also attached it to the generic head."""
 PRIOR_DEVIATION_MM = 2.5
 """How far the generic head lies from a person's where no photo tells."""
-DISTRUST_SIGMAS = 5.0
-MISFIT_SIGMAS, MISFIT_RATIO = 4.0, 3.0
-MIN_PARALLAX_DEG = 8.0
-
-
-@dataclass(frozen=True)
-class Mark:
-    """One feature in one photo: where it was seen and how far off the model puts it, px."""
-
-    name: str
-    image_point: Float[Array, " 2"]
-    residual_px: Float[Array, " 2"]
-    by_hand: bool
-    verdict: str = ""
-
-    @property
-    def distance_px(self) -> float:
-        """Length of the residual."""
-        return float(np.hypot(*self.residual_px))
-
-
-@dataclass(frozen=True)
-class PhotoFit:
-    """The camera of one photo and how well its marks agree with the fitted head."""
-
-    camera: Camera
-    marks: tuple[Mark, ...]
-
-    @property
-    def trusted(self) -> tuple[Mark, ...]:
-        """The marks without a verdict."""
-        return tuple(mark for mark in self.marks if not mark.verdict)
-
-    @property
-    def rms_px(self) -> float:
-        """Root mean square distance over the trusted marks."""
-        squares = [mark.distance_px**2 for mark in self.trusted]
-        return float(np.sqrt(np.mean(squares))) if squares else 0.0
 
 
 @dataclass(frozen=True)
@@ -115,34 +78,29 @@ def fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions) 
     Raises: EstimationError: no photo fits.
     Source: P02 sec. 5.1.
     """
-    features = gather_features(views, generic)
     left_out: dict[str, str] = {}
     while True:
-        solution = _solve(views, features, generic, options)
+        solution = _solve(views, gather_features(views, generic), generic, options)
         left_out |= solution.problems
-        misfit = _misfit(solution)
+        sigma_px = solution.features.sigma_px(solution.cameras)
+        misfit = find_misfit(solution.residuals, sigma_px)
         if misfit is None:
             break
-        left_out |= misfit
-        views = [view for view in solution.views if view.photo.name not in misfit]
-        features = gather_features(views, generic)
+        worst, why = misfit
+        left_out[solution.views[worst].photo.name] = why
+        views = [view for k, view in enumerate(solution.views) if k != worst]
     vertices, cameras = _in_head_space(solution, generic, options)
-    photos = {
-        view.photo.name: PhotoFit(camera, _marks(solution, k))
-        for k, (view, camera) in enumerate(zip(solution.views, cameras, strict=True))
-    }
-    return Fit(
-        vertices=vertices,
-        photos=photos,
-        left_out=left_out,
-        uncertainty_mm=vertex_uncertainty(
-            solution.vertices,
-            solution.features.on(solution.vertices),
-            solution.deviation_mm,
-            prior_mm=PRIOR_DEVIATION_MM,
-        ),
-        notes=_notes(cameras),
+    photos = {}
+    for k, (view, camera) in enumerate(zip(solution.views, cameras, strict=True)):
+        marks = judge_marks(solution.features, k, solution.residuals[k], sigma_px[k])
+        photos[view.photo.name] = PhotoFit(camera, marks)
+    uncertainty = vertex_uncertainty(
+        solution.vertices,
+        solution.features.on(solution.vertices),
+        solution.deviation_mm,
+        prior_mm=PRIOR_DEVIATION_MM,
     )
+    return Fit(vertices, photos, left_out, uncertainty, depth_notes(cameras))
 
 
 @dataclass(frozen=True)
@@ -178,7 +136,7 @@ def _solve(
     keep = np.array([not text for text in start.problems])
     views = [view for view in views if view.photo.name not in problems]
     cameras = tuple(camera for camera in start.cameras if camera is not None)
-    points = start.points[_shown(features, keep)]
+    points = start.points[features.seen[keep].any(axis=0)]
     features = features.of_photos(keep)
     vertices = generic.mesh.vertices
     for _ in range(options.rounds):
@@ -213,7 +171,7 @@ def _adjust(
         cameras,
         points,
         features.image_points,
-        sigma_px=np.where(features.seen, _sigma_px(features, cameras), 1.0),
+        sigma_px=np.where(features.seen, features.sigma_px(cameras), 1.0),
         loss="cauchy",
         shape_prior=prior,
         focal_prior=_focal_prior(views),
@@ -228,18 +186,6 @@ def _intersect(
     weights = 1 / features.sigma_mm**2
     rays = intersect_rays(cameras, features.image_points, weights=weights, current=places)
     return rays.points, np.where(rays.solved, rays.residual_mm, PRIOR_DEVIATION_MM)
-
-
-def _shown(features: Features, keep: Bool[Array, " k"]) -> Bool[Array, " n"]:
-    """(N,) features that one of these photos shows."""
-    return np.asarray(features.seen[keep].any(axis=0))
-
-
-def _sigma_px(features: Features, cameras: Sequence[Camera]) -> Float[Array, "k n"]:
-    """(K, N) px: the observations' deviations as the photos show them; inf where unseen."""
-    px_per_mm = [camera.focal_px / camera.t_cam_head[2] for camera in cameras]
-    sigma: Array = features.sigma_mm * np.array(px_per_mm)[:, None]
-    return sigma
 
 
 def _focal_prior(views: Sequence[View]) -> FocalPrior:
@@ -260,25 +206,6 @@ def _lenses(views: Sequence[View]) -> Int[Array, " k"]:
     return np.array([files.index(file) for file in files])
 
 
-def _misfit(solution: _Solution) -> dict[str, str] | None:
-    """The photo that fits worst, and why, if it fits so badly that it shows something else."""
-    if len(solution.cameras) < 2:
-        return None
-    off = np.linalg.norm(solution.residuals, axis=2) / _sigma_px(
-        solution.features, solution.cameras
-    )
-    typical = np.array([np.sqrt(np.median(row[np.isfinite(row)] ** 2)) for row in off])
-    worst = int(typical.argmax())
-    others = float(np.median(np.delete(typical, worst)))
-    if typical[worst] < max(MISFIT_SIGMAS, MISFIT_RATIO * others):
-        return None
-    reason = (
-        f"its marks lie {typical[worst]:.1f} times their expected error off the head that the "
-        f"other photos show ({others:.1f} times there)"
-    )
-    return {solution.views[worst].photo.name: reason}
-
-
 def _in_head_space(
     solution: _Solution, generic: GenericHead, options: FitOptions
 ) -> tuple[Float[Array, "v 3"], tuple[Camera, ...]]:
@@ -291,37 +218,3 @@ def _in_head_space(
         for camera in solution.cameras
     )
     return scale * (solution.vertices - origin), cameras
-
-
-def _marks(solution: _Solution, k: int) -> tuple[Mark, ...]:
-    """Every mark of photo k with its residual; far off its expected error it is distrusted."""
-    features = solution.features
-    sigma_px = _sigma_px(features, solution.cameras)[k]
-    marks = []
-    for n in np.flatnonzero(features.seen[k]):
-        residual = solution.residuals[k, n]
-        off = float(np.hypot(*residual)) / sigma_px[n]
-        verdict = f"{off:.0f} times its expected error off" if off > DISTRUST_SIGMAS else ""
-        marks.append(
-            Mark(
-                features.names[n],
-                features.image_points[k, n],
-                residual,
-                bool(features.by_hand[k, n]),
-                verdict,
-            )
-        )
-    return tuple(marks)
-
-
-def _notes(cameras: Sequence[Camera]) -> tuple[str, ...]:
-    if len(cameras) == 1:
-        return ("one photo: depth comes from the prior of faces, not from this person",)
-    axes = np.stack([camera.center / np.linalg.norm(camera.center) for camera in cameras])
-    spread = float(np.degrees(np.arccos(np.clip(axes @ axes.T, -1, 1)).max()))
-    if spread < MIN_PARALLAX_DEG:
-        return (
-            f"all photos come from within {spread:.0f} degrees: depth comes from the prior of "
-            f"faces, not from this person ({MIN_PARALLAX_DEG:.0f} degrees or more would show it)",
-        )
-    return ()

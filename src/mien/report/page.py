@@ -10,8 +10,9 @@ import numpy as np
 
 from mien.arrays import Array, Float, UInt8
 from mien.camera import Camera
-from mien.model.fit import Fit, Mark, PhotoFit
+from mien.model.fit import Fit
 from mien.model.head import Head
+from mien.model.verdict import Mark, PhotoFit
 from mien.report.pictures import coverage_pictures, overlay_picture, preview_pictures
 
 

@@ -1,0 +1,100 @@
+"""Which marks and which photos do not fit the head, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.camera import Camera
+from mien.model.features import Features
+
+DISTRUST_SIGMAS = 5.0
+"""A mark this many times its expected error off the model is distrusted."""
+MISFIT_SIGMAS, MISFIT_RATIO = 4.0, 3.0
+"""A photo is left out when its marks lie, in the median, this many expected errors off, and this
+many times farther than the other photos'."""
+MIN_PARALLAX_DEG = 8.0
+
+
+@dataclass(frozen=True)
+class Mark:
+    """One feature in one photo: where it was seen and how far off the model puts it, px."""
+
+    name: str
+    image_point: Float[Array, " 2"]
+    residual_px: Float[Array, " 2"]
+    by_hand: bool
+    verdict: str = ""
+
+    @property
+    def distance_px(self) -> float:
+        """Length of the residual."""
+        return float(np.hypot(*self.residual_px))
+
+
+@dataclass(frozen=True)
+class PhotoFit:
+    """The camera of one photo and how well its marks agree with the fitted head."""
+
+    camera: Camera
+    marks: tuple[Mark, ...]
+
+    @property
+    def trusted(self) -> tuple[Mark, ...]:
+        """The marks without a verdict."""
+        return tuple(mark for mark in self.marks if not mark.verdict)
+
+    @property
+    def rms_px(self) -> float:
+        """Root mean square distance over the trusted marks."""
+        squares = [mark.distance_px**2 for mark in self.trusted]
+        return float(np.sqrt(np.mean(squares))) if squares else 0.0
+
+
+def judge_marks(
+    features: Features, k: int, residuals: Float[Array, "n 2"], sigma_px: Float[Array, " n"]
+) -> tuple[Mark, ...]:
+    """Every mark of photo k with its residual; far off its expected error it gets a verdict."""
+    marks = []
+    for n in np.flatnonzero(features.seen[k]):
+        off = float(np.hypot(*residuals[n])) / sigma_px[n]
+        verdict = f"{off:.0f} times its expected error off" if off > DISTRUST_SIGMAS else ""
+        by_hand = bool(features.by_hand[k, n])
+        place = features.image_points[k, n]
+        marks.append(Mark(features.names[n], place, residuals[n], by_hand, verdict))
+    return tuple(marks)
+
+
+def find_misfit(
+    residuals: Float[Array, "k n 2"], sigma_px: Float[Array, "k n"]
+) -> tuple[int, str] | None:
+    """The photo that fits worst and why, if it fits so badly that it shows something else."""
+    if len(residuals) < 2:
+        return None
+    off = np.linalg.norm(residuals, axis=2) / sigma_px
+    typical = np.array([np.median(row[np.isfinite(row)]) for row in off])
+    worst = int(typical.argmax())
+    others = float(np.median(np.delete(typical, worst)))
+    if typical[worst] < max(MISFIT_SIGMAS, MISFIT_RATIO * others):
+        return None
+    return worst, (
+        f"its marks lie {typical[worst]:.1f} times their expected error off the head that the "
+        f"other photos show ({others:.1f} times there)"
+    )
+
+
+def depth_notes(cameras: Sequence[Camera]) -> tuple[str, ...]:
+    """What the user should know when the viewpoints do not tell depth."""
+    if len(cameras) == 1:
+        return ("one photo: depth comes from the prior of faces, not from this person",)
+    axes = np.stack([camera.center / np.linalg.norm(camera.center) for camera in cameras])
+    spread = float(np.degrees(np.arccos(np.clip(axes @ axes.T, -1, 1)).max()))
+    if spread < MIN_PARALLAX_DEG:
+        return (
+            f"all photos come from within {spread:.0f} degrees: depth comes from the prior of "
+            f"faces, not from this person ({MIN_PARALLAX_DEG:.0f} degrees or more would show it)",
+        )
+    return ()
