@@ -1,0 +1,39 @@
+from __future__ import annotations
+
+import pytest
+
+from mien.app.progress import terminal_progress
+
+
+def test_bars_are_drawn_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
+    with terminal_progress(quiet=False) as progress:
+        progress("Finding faces", 0, 2)
+        progress("Finding faces", 2, 2)
+        progress("Thinking", 0, 0)
+    seen = capsys.readouterr()
+    assert seen.out == ""
+    assert "Finding faces" in seen.err
+    assert "Thinking" in seen.err
+
+
+def test_quiet_draws_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    with terminal_progress(quiet=True) as progress:
+        progress("Finding faces", 1, 2)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_nothing_to_do_draws_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    with terminal_progress(quiet=False):
+        pass
+    assert capsys.readouterr() == ("", "")
+
+
+def test_an_error_ends_the_bars(capsys: pytest.CaptureFixture[str]) -> None:
+    def fail() -> None:
+        with terminal_progress(quiet=False) as progress:
+            progress("Finding faces", 1, 2)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert capsys.readouterr().err.endswith("\n")
