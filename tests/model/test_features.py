@@ -7,14 +7,16 @@ import pytest
 from scipy.spatial import cKDTree
 
 from mien.assets.generic import load_generic_head
+from mien.assets.landmark_sets import ON_EDGES
 from mien.capture.annotations import Annotations
 from mien.capture.source import View
 from mien.errors import InputError
 from mien.model.features import (
     CURVE_SIGMA_MM,
-    LANDMARK_SIGMA_MM,
+    EDGE_SIGMA_MM,
     MIN_CONFIDENCE,
     POINT_SIGMA_MM,
+    SKIN_SIGMA_MM,
     WINS_WITHIN_MM,
     Features,
     gather_features,
@@ -72,7 +74,8 @@ def test_deviations_tell_what_kind_of_mark_it_is() -> None:
     sigma = features.sigma_mm[0]
     assert sigma[column(features, "chin")] == POINT_SIGMA_MM
     assert sigma[column(features, "hairline.4")] == CURVE_SIGMA_MM
-    assert sigma[column(features, f"landmark {far}")] == LANDMARK_SIGMA_MM / 0.5
+    deviation = EDGE_SIGMA_MM if far in ON_EDGES else SKIN_SIGMA_MM
+    assert sigma[column(features, f"landmark {far}")] == deviation / 0.5
     assert (features.by_hand[0] == ~is_landmark(features)).all()
 
 

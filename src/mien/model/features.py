@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from mien.arrays import Array, Bool, Float, Int
 from mien.assets.generic import GenericHead
+from mien.assets.landmark_sets import FACE_OVAL, ON_EDGES
 from mien.camera import Camera
 from mien.capture.source import View
 from mien.errors import InputError
@@ -19,8 +20,10 @@ POINT_SIGMA_MM = 0.5
 """How well a person places a named point (about 1 px where a face fills a 2-megapixel photo)."""
 CURVE_SIGMA_MM = 1.0
 """How well a drawn curve tells a point's place along it."""
-LANDMARK_SIGMA_MM = 2.5
-"""How far a detector's point slides over the skin between views (docs/pose-recovery.md)."""
+EDGE_SIGMA_MM = 2.5
+"""How far a landmark on an eye, brow, lip or the nose slides over the skin between views."""
+SKIN_SIGMA_MM = 12.0
+"""The same for one on plain skin, which the detector only guesses (docs/pose-recovery.md)."""
 MIN_CONFIDENCE = 0.1
 """Landmarks below are not used: the surface turns away there."""
 WINS_WITHIN_MM = 25.0
@@ -86,7 +89,10 @@ def gather_features(views: Sequence[View], generic: GenericHead) -> Features:
     known. A point marked by name wins over the curve through it.
     """
     columns = _columns(generic)
-    landmarks = np.flatnonzero(generic.landmark_attached & _steady_landmarks())
+    # The face oval runs along the silhouette, wherever that is: no place on the surface.
+    steady = ~np.isin(np.arange(478), list(FACE_OVAL))
+    landmarks = np.flatnonzero(generic.landmark_attached & steady)
+    slide = np.where(np.isin(landmarks, list(ON_EDGES)), EDGE_SIGMA_MM, SKIN_SIGMA_MM)
     vertices = list(columns)
     image = np.full((len(views), len(vertices) + len(landmarks), 2), np.nan)
     sigma = np.full(image.shape[:2], np.inf)
@@ -101,7 +107,7 @@ def gather_features(views: Sequence[View], generic: GenericHead) -> Features:
             image[k, len(vertices) :] = view.landmarks.points[landmarks]
             sigma[k, len(vertices) :] = np.where(
                 confidence > MIN_CONFIDENCE,
-                LANDMARK_SIGMA_MM / np.maximum(confidence, MIN_CONFIDENCE),
+                slide / np.maximum(confidence, MIN_CONFIDENCE),
                 np.inf,
             )
     first_corner = np.tile([1.0, 0.0, 0.0], (len(vertices), 1))
@@ -202,19 +208,3 @@ def _silence_landmarks(features: Features, generic: GenericHead) -> Features:
             sigma[k, landmark & (distance < WINS_WITHIN_MM)] = np.inf
     image = np.where(np.isfinite(sigma)[..., None], features.image_points, np.nan)
     return replace(features, image_points=image, sigma_mm=sigma)
-
-
-def _steady_landmarks() -> Bool[Array, " 478"]:
-    """All but the face oval: its points run along the silhouette, wherever that is."""
-    steady = np.ones(478, bool)
-    steady[list(_FACE_OVAL)] = False
-    return steady
-
-
-# The detector's own list of the points around the face, from the forehead clockwise in the image.
-# fmt: off
-_FACE_OVAL = (
-    10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377,
-    152, 148, 176, 149, 150, 136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109,
-)
-# fmt: on

@@ -113,9 +113,11 @@ def resect_robustly(
         sigma = np.array([robust_sigma(d[w > 0]) for d, w in zip(lengths, weights, strict=True)])
         sigma = np.maximum(sigma, SIGMA_FLOOR_PX)
         trust = weights * loss_named(loss)((lengths / sigma[:, None]) ** 2)[1]
+    # Weights are relative: a photo whose marks weigh more than another's is not farther off.
     return poses, sigma * np.array(
         [
             np.sqrt(points[w > 0].var(axis=0).sum() / max(x[w > 0].var(axis=0).sum(), 1e-12))
+            / np.sqrt(np.median(w[w > 0]))
             for x, w in zip(image, weights, strict=True)
         ]
     )
