@@ -73,13 +73,14 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def untextured(monkeypatch: pytest.MonkeyPatch, quick: None) -> None:
-    """Builds of grey heads, where it is the photos and cameras that count."""
+    """Builds of grey heads without a report, where it is the photos and cameras that count."""
 
     def grey(*arguments: object, surface: SurfaceMap, **options: object) -> Texture:
         shape = surface.triangle_ids.shape
         return Texture(np.full((*shape, 3), 128, np.uint8), np.ones(shape), np.ones((1, 3)))
 
     monkeypatch.setattr("mien.build.extract_texture", grey)
+    monkeypatch.setattr("mien.build.render_report", lambda data: "")
 
 
 @pytest.fixture

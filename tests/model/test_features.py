@@ -7,16 +7,13 @@ import pytest
 from scipy.spatial import cKDTree
 
 from mien.assets.generic import load_generic_head
-from mien.assets.landmark_sets import ON_EDGES
 from mien.capture.annotations import Annotations
 from mien.capture.source import View
 from mien.errors import InputError
 from mien.model.features import (
     CURVE_SIGMA_MM,
-    EDGE_SIGMA_MM,
     MIN_CONFIDENCE,
     POINT_SIGMA_MM,
-    SKIN_SIGMA_MM,
     WINS_WITHIN_MM,
     Features,
     gather_features,
@@ -70,13 +67,13 @@ def test_features_on_a_stack_of_offsets() -> None:
 def test_deviations_tell_what_kind_of_mark_it_is() -> None:
     view = photographed(PERSON, FRONT, points=["chin"], curves=["hairline"], landmarks=True)
     far = 33  # A landmark at the eye, far from the chin and the hairline.
-    features = gather_features([without_confidence(view, [far], 0.5)], GENERIC)
-    sigma = features.sigma_mm[0]
-    assert sigma[column(features, "chin")] == POINT_SIGMA_MM
-    assert sigma[column(features, "hairline.4")] == CURVE_SIGMA_MM
-    deviation = EDGE_SIGMA_MM if far in ON_EDGES else SKIN_SIGMA_MM
-    assert sigma[column(features, f"landmark {far}")] == deviation / 0.5
-    assert (features.by_hand[0] == ~is_landmark(features)).all()
+    sure = gather_features([view], GENERIC)
+    doubtful = gather_features([without_confidence(view, [far], 0.5)], GENERIC)
+    sigma, at = doubtful.sigma_mm[0], column(sure, f"landmark {far}")
+    assert sigma[column(doubtful, "chin")] == POINT_SIGMA_MM
+    assert sigma[column(doubtful, "hairline.4")] == CURVE_SIGMA_MM
+    assert sigma[at] == 2 * sure.sigma_mm[0, at] > 2 * CURVE_SIGMA_MM
+    assert (doubtful.by_hand[0] == ~is_landmark(doubtful)).all()
 
 
 def test_a_landmark_without_confidence_is_not_used() -> None:

@@ -173,6 +173,15 @@ def test_a_wrong_photo_is_named_and_changes_nothing(wrong: Callable[[View], View
     assert list(fit.photos) == list(three_fit().photos)
 
 
+def test_a_marked_photo_beside_detected_ones_is_kept() -> None:
+    """Marks by hand weigh more, which must not make their photo seem farther off."""
+    views = views_of(FIVE[1:4], points=(), landmarks=True)
+    views[0] = photographed(PERSON, FIVE[1], name="marked.png", points=MARKS)
+    fit = fit_views(views, GENERIC, QUICK)
+    assert fit.left_out == {}
+    assert list(fit.photos) == ["marked.png", "1.png", "2.png"]
+
+
 def test_a_slipped_mark_is_distrusted_and_changes_little() -> None:
     views = views_of(FIVE[1:4], points=MARKS)
     assert views[0].annotations is not None
