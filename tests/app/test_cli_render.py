@@ -115,7 +115,7 @@ def test_a_unit_moves_its_part_of_the_face_alone(built: Built, mien: Mien, tmp_p
     before, after = (pixels(tmp_path / name).astype(int) for name in ("a.png", "b.png"))
     rows = np.flatnonzero(np.abs(after - before).max(axis=(1, 2)) > 40)
     head = np.flatnonzero(before[..., 3].any(axis=1))
-    assert rows.min() > head.mean(), "nothing above the mouth"
+    assert (rows > head.mean()).mean() > 0.95, "next to nothing above the mouth: the jaw's hinge"
     assert len(rows) > 20
 
 

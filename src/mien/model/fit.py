@@ -18,7 +18,14 @@ from mien.model.features import Features, gather_features, rematch_curves
 from mien.model.pose import recover_pose
 from mien.model.rays import intersect_rays
 from mien.model.shape import shape_from_features
-from mien.model.verdict import PhotoFit, depth_notes, find_misfit, judge_marks
+from mien.model.verdict import (
+    HOPELESS_SIGMAS,
+    PhotoFit,
+    depth_notes,
+    find_misfit,
+    judge_marks,
+    typical_misfits,
+)
 
 FOCAL_PRIOR_DIAGONALS = 1.7
 """Without EXIF: a focal length between a phone's (0.6 diagonals) and a cropped portrait's (3.5)."""
@@ -29,6 +36,8 @@ NAMED_SIGMA_MM = 2.0
 faces and between people who mark them (docs/pose-recovery.md)."""
 ATTACHED_SIGMA_MM = 1.5
 """The same for a landmark: the detector that finds it also attached it to the generic head."""
+NEAREST_MM = 150.0
+"""No photo of a face is taken from nearer to the eyes; a camera there is a solver gone astray."""
 PRIOR_DEVIATION_MM = 2.5
 """How far the generic head lies from a person's where no photo tells."""
 
@@ -82,14 +91,14 @@ def fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions) 
     while True:
         solution = _solve(views, gather_features(views, generic), generic, options)
         left_out |= solution.problems
-        sigma_px = solution.features.sigma_px(solution.cameras)
-        misfit = find_misfit(solution.residuals, sigma_px)
+        misfit = _misfit(solution, generic, options)
         if misfit is None:
             break
         worst, why = misfit
         left_out[solution.views[worst].photo.name] = why
         views = [view for k, view in enumerate(solution.views) if k != worst]
     vertices, cameras = _in_head_space(solution, generic, options)
+    sigma_px = solution.features.sigma_px(solution.cameras)
     photos = {}
     for k, (view, camera) in enumerate(zip(solution.views, cameras, strict=True)):
         marks = judge_marks(solution.features, k, solution.residuals[k], sigma_px[k])
@@ -103,6 +112,23 @@ def fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions) 
     return Fit(vertices, photos, left_out, uncertainty, depth_notes(cameras))
 
 
+def _misfit(
+    solution: _Solution, generic: GenericHead, options: FitOptions
+) -> tuple[int, str] | None:
+    """The photo to leave out, if any, and why."""
+    typical = solution.typical_misfits
+    if len(typical) < 2 or typical.min() < HOPELESS_SIGMAS:
+        return find_misfit(typical)
+    # Together they make no head at all: the one to blame makes none by itself either.
+    alone = [
+        _solve([view], gather_features([view], generic), generic, options).typical_misfits[0]
+        for view in solution.views
+    ]
+    worst = int(np.argmax(alone))
+    off = f", they lie {alone[worst]:.0f} times their expected error off the nearest"
+    return worst, f"no head has its marks in these places{off if alone[worst] < np.inf else ''}"
+
+
 @dataclass(frozen=True)
 class _Solution:
     """Cameras and shape in the frame and scale of the solver."""
@@ -114,6 +140,13 @@ class _Solution:
     residuals: Float[Array, "k n 2"]
     deviation_mm: Float[Array, " n"]
     problems: dict[str, str]
+
+    @property
+    def typical_misfits(self) -> Float[Array, " k"]:
+        """(K,) how many expected errors each photo's marks lie off, in the median."""
+        typical = typical_misfits(self.residuals, self.features.sigma_px(self.cameras))
+        distance = np.array([camera.t_cam_head[2] for camera in self.cameras])
+        return np.where(distance < NEAREST_MM, np.inf, typical)
 
 
 def _solve(

@@ -16,6 +16,8 @@ DISTRUST_SIGMAS = 5.0
 MISFIT_SIGMAS, MISFIT_RATIO = 4.0, 3.0
 """A photo is left out when its marks lie, in the median, this many expected errors off, and this
 many times farther than the other photos'."""
+HOPELESS_SIGMAS = 12.0
+"""When every photo's marks lie this far off, one of them spoils the head for all."""
 MIN_PARALLAX_DEG = 8.0
 
 
@@ -68,14 +70,18 @@ def judge_marks(
     return tuple(marks)
 
 
-def find_misfit(
+def typical_misfits(
     residuals: Float[Array, "k n 2"], sigma_px: Float[Array, "k n"]
-) -> tuple[int, str] | None:
-    """The photo that fits worst and why, if it fits so badly that it shows something else."""
-    if len(residuals) < 2:
-        return None
+) -> Float[Array, " k"]:
+    """(K,) how many expected errors each photo's marks lie off, in the median."""
     off = np.linalg.norm(residuals, axis=2) / sigma_px
-    typical = np.array([np.median(row[np.isfinite(row)]) for row in off])
+    return np.array([np.median(row[np.isfinite(row)]) for row in off])
+
+
+def find_misfit(typical: Float[Array, " k"]) -> tuple[int, str] | None:
+    """The photo that fits worst and why, if it fits so badly that it shows something else."""
+    if len(typical) < 2:
+        return None
     worst = int(typical.argmax())
     others = float(np.median(np.delete(typical, worst)))
     if typical[worst] < max(MISFIT_SIGMAS, MISFIT_RATIO * others):
