@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from mien.app.progress import terminal_progress
@@ -37,3 +39,16 @@ def test_an_error_ends_the_bars(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(ZeroDivisionError):
         fail()
     assert capsys.readouterr().err.endswith("\n")
+
+
+def test_the_first_run_says_that_it_compiles(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    with terminal_progress(quiet=False) as progress:
+        progress("Stage", 1, 1)
+    assert "First run: compiling" in capsys.readouterr().err
+    (tmp_path / "kernel.nbi").touch()
+    with terminal_progress(quiet=False) as progress:
+        progress("Stage", 1, 1)
+    assert "First run" not in capsys.readouterr().err

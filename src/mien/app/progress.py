@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -37,6 +39,8 @@ def terminal_progress(quiet: bool) -> Iterator[Progress]:
 
     def advance(stage: str, done: int, total: int) -> None:
         if not tasks:
+            if not _kernels_are_compiled():
+                bars.console.print("First run: compiling kernels on the way, once, some 15 s.")
             bars.start()
         if stage not in tasks:
             tasks[stage] = bars.add_task(stage, total=total or None)
@@ -47,3 +51,10 @@ def terminal_progress(quiet: bool) -> Iterator[Progress]:
     finally:
         if tasks:
             bars.stop()
+
+
+def _kernels_are_compiled() -> bool:
+    """Whether Numba has kept machine code of mien from an earlier run."""
+    place = os.environ.get("NUMBA_CACHE_DIR")
+    folder = Path(place) if place else Path(__file__).parents[1]
+    return next(folder.rglob("*.nbi"), None) is not None

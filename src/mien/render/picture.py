@@ -62,8 +62,8 @@ def with_units(head: Head, units: Mapping[str, float]) -> Float[Array, "v 3"]:
 def turntable_frames(
     head: Head,
     *,
-    frames: int = 96,
-    size: tuple[int, int] = (480, 600),
+    frames: int = 72,
+    size: tuple[int, int] = (400, 500),
     background: tuple[int, int, int] = (72, 74, 84),
 ) -> Iterator[UInt8[Array, "h w 3"]]:
     """The head once around, one picture at a time."""
