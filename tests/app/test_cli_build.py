@@ -130,7 +130,7 @@ def test_the_papers_own_way_and_what_a_person_reads(
 
 
 def test_expression_folders_may_repeat_the_photos_names(
-    james: Path, mien: Mien, tmp_path: Path, quick: None
+    james: Path, mien: Mien, tmp_path: Path, untextured: None
 ) -> None:
     source = tmp_path / "source"
     for expression, side in (("Neutral", "left"), ("joy", "right")):
@@ -148,8 +148,6 @@ def test_expression_folders_may_repeat_the_photos_names(
         with Image.open(io.BytesIO(kept)) as image, Image.open(james / f"{side}.png") as given:
             np.testing.assert_array_equal(np.asarray(image), np.asarray(given))
         assert (head / "annotations" / name / "a.json").is_file()
-    report = (head / "report.html").read_text(encoding="utf-8")
-    assert report.count("joy/a.png") >= 2
 
 
 def test_without_a_neutral_folder(james: Path, mien: Mien, tmp_path: Path) -> None:
