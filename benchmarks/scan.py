@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
+from benchmarks.nearest import NearestPoint
 from mien.arrays import Array, Float, Int
 from mien.camera import Camera
 from mien.mesh import Mesh
-from mien.numeric.raster import rasterize
+from mien.numeric.rotation import angle_between
+from mien.numeric.similarity import estimate_similarity
+from mien.render.shade import rasterize_mesh, shown_parts
 
 FACE_RADIUS_MM = 12.0
+"""A face reaches this far around the landmarks' attachments."""
 TRIM = 0.05
+"""Share of the samples, the worst, that does not count while aligning; it does when reporting."""
+ALIGNING = 3000
+"""How many samples take part in the alignment."""
 
 
 @dataclass(frozen=True)
@@ -26,40 +35,55 @@ class Scan:
     surface: trimesh.Trimesh
     cameras: dict[str, Camera]
 
+    @cached_property
+    def nearest(self) -> NearestPoint:
+        """Finds nearest points of the surface."""
+        return NearestPoint(self.surface)
+
 
 @dataclass(frozen=True)
 class SurfaceError:
-    """Distances in mm from samples of a head's face to the scan, after alignment."""
+    """Distances in mm from samples of a head's face to the nearest points of the scan."""
 
     median: float
     mean: float
     p95: float
 
+    @classmethod
+    def of(cls, distances: Float[Array, " n"]) -> SurfaceError:
+        """Summary of (N,) distances."""
+        p95 = np.quantile(distances, 0.95)
+        return cls(float(np.median(distances)), float(distances.mean()), float(p95))
+
     def __str__(self) -> str:
         return f"{self.median:.2f} / {self.mean:.2f} / {self.p95:.2f}"
 
 
-def load_scan(folder: Path) -> Scan:
-    """The scan and cameras of a folder of development data (`james` or `emily`)."""
-    entries = json.loads((folder / "cameras_opencv.json").read_text())
-    unit = 1.0 if folder.name == "james" else 10.0
-    cameras = {
-        name: _camera(entry, unit)
-        for name, entry in entries.items()
-        if name[0] != "_" and "K" in entry
-    }
-    if folder.name == "james":
-        surface = trimesh.load_mesh(folder / "james.obj", process=False)
-    else:
-        surface = trimesh.load_mesh(folder / "geometry" / "Emily_head_mesh.ply", process=False)
-        surface.apply_transform(np.array(entries["object_to_world"]))
-        surface.apply_scale(unit)
-    return Scan(surface, cameras)
+@dataclass(frozen=True)
+class Comparison:
+    """A head laid on a scan.
+
+    Attributes:
+        before: errors where points that share a pixel put the head.
+        after: errors after ICP.
+        T_scan_head: (4, 4) the similarity that ICP ended with.
+    """
+
+    before: SurfaceError
+    after: SurfaceError
+    T_scan_head: Float[Array, "4 4"]
+
+    def __str__(self) -> str:
+        return str(self.after)
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Points fixed to a mesh, so that the same places are compared on every head."""
+    """Points fixed to a mesh, so that the same places are compared on every head.
+
+    Attributes:
+        triangles: (N, 3) vertices of the triangle that holds each; barycentrics: (N, 3) in it.
+    """
 
     triangles: Int[Array, "n 3"]
     barycentrics: Float[Array, "n 3"]
@@ -70,70 +94,88 @@ class Samples:
         return places
 
 
-def face_samples(mesh: Mesh, cameras: list[Camera], near: Float[Array, "n 3"]) -> Samples:
-    """What the head's own cameras see of it, within 12 mm of a landmark's attachment.
+def load_scan(folder: Path) -> Scan:
+    """The scan and cameras of a folder of development data (`james` or `emily`)."""
+    entries = json.loads((folder / "cameras_opencv.json").read_text(encoding="utf-8"))
+    if folder.name == "james":
+        unit, surface = 1.0, trimesh.load_mesh(folder / "james.obj", process=False)
+    else:
+        unit, path = 10.0, folder / "geometry" / "Emily_head_mesh.ply"
+        surface = trimesh.load_mesh(path, process=False)
+        surface.apply_transform(np.array(entries["object_to_world"]))
+        surface.apply_scale(unit)
+    cameras = {
+        name: _camera(entry, unit)
+        for name, entry in entries.items()
+        if isinstance(entry, dict) and "K" in entry
+    }
+    return Scan(surface, cameras)
+
+
+def _camera(entry: dict, unit: float) -> Camera:
+    """A camera of the data; its matrix is made a rotation, its pixels square."""
+    K = np.array(entry["K"])
+    U, _, Vt = np.linalg.svd(np.array(entry["R"]))
+    return Camera(
+        width=entry["width"],
+        height=entry["height"],
+        focal_px=float(K[0, 0] + K[1, 1]) / 2,
+        R_cam_head=U @ Vt,
+        t_cam_head=np.array(entry["t"]) * unit,
+        principal_px=K[:2, 2],
+    )
+
+
+def face_samples(
+    mesh: Mesh, cameras: list[Camera], near: Float[Array, "n 3"], *, height: int = 350
+) -> Samples:
+    """What a head's own cameras see of its face, so that mouth cavity and sockets do not count.
 
     Args:
         mesh: the fitted head.
-        cameras: its cameras; every fourth pixel of a small raster is taken.
+        cameras: its cameras; every pixel of an image of this height gives a sample.
         near: (N, 3) mm, the landmarks' attachments on the same head.
     """
+    mesh = mesh.submesh(mesh.triangles_of(*shown_parts(mesh)))
     tree = cKDTree(near)
     triangles, barycentrics = [], []
-    for camera in (camera.resized(500 / camera.height) for camera in cameras):
-        in_camera = camera.to_camera(mesh.vertices)
-        raster = rasterize(
-            camera.project(mesh.vertices),
-            in_camera[:, 2],
-            mesh.triangles,
-            camera.width,
-            camera.height,
-        )
-        hit = raster.triangle_ids >= 0
-        corners = mesh.triangles[raster.triangle_ids[hit]]
-        samples = Samples(corners, np.asarray(raster.barycentrics[hit], np.float64))
+    for camera in cameras:
+        raster = rasterize_mesh(mesh, camera.resized(height / camera.height))
+        corners = mesh.triangles[raster.triangle_ids[raster.mask]]
+        samples = Samples(corners, raster.barycentrics[raster.mask].astype(np.float64))
         close = tree.query(samples.on(mesh.vertices))[0] < FACE_RADIUS_MM
-        triangles.append(samples.triangles[close][::2])
-        barycentrics.append(samples.barycentrics[close][::2])
+        triangles.append(samples.triangles[close])
+        barycentrics.append(samples.barycentrics[close])
     return Samples(np.concatenate(triangles), np.concatenate(barycentrics))
 
 
 def start_from_shared_pixels(
-    scan: Scan, mesh: Mesh, camera: Camera, true_camera: Camera
+    scan: Scan, mesh: Mesh, camera: Camera, true_camera: Camera, *, height: int = 250
 ) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"]]:
     """Points of the head and of the scan that are seen through the same pixels of one photo."""
-    factor = 250 / camera.height
-    clouds = []
-    surfaces = (
-        (mesh.vertices, mesh.triangles, camera.resized(factor)),
-        (
-            np.asarray(scan.surface.vertices),
-            np.asarray(scan.surface.faces, np.int32),
-            true_camera.resized(factor),
-        ),
-    )
-    for vertices, triangles, small in surfaces:
-        depth = small.to_camera(vertices)[:, 2]
-        raster = rasterize(small.project(vertices), depth, triangles, small.width, small.height)
-        rows, columns = np.mgrid[: small.height, : small.width] + 0.5
-        pixels = np.column_stack([columns.ravel(), rows.ravel()])
-        seen = raster.triangle_ids.ravel() >= 0
-        flat = np.where(seen, raster.depth.ravel(), 1.0).astype(np.float64)
-        clouds.append((small.unproject(pixels, flat), seen))
-    both = clouds[0][1] & clouds[1][1]
-    return clouds[0][0][both], clouds[1][0][both]
+    scanned = Mesh(np.array(scan.surface.vertices), np.array(scan.surface.faces, np.int32))
+    shown = mesh.submesh(mesh.triangles_of(*shown_parts(mesh)))
+    factor = height / camera.height
+    on_head, seen = _seen_points(shown, camera.resized(factor))
+    on_scan, scan_seen = _seen_points(scanned, true_camera.resized(factor))
+    both = seen & scan_seen
+    return on_head[both], on_scan[both]
+
+
+def _seen_points(mesh: Mesh, camera: Camera) -> tuple[Float[Array, "p 3"], Array]:
+    """The surface behind every pixel, row by row, and where there is any."""
+    raster = rasterize_mesh(mesh, camera)
+    rows, columns = np.mgrid[: camera.height, : camera.width] + 0.5
+    depth = np.where(raster.mask, raster.depth, 1.0).astype(np.float64)
+    pixels = np.column_stack([columns.ravel(), rows.ravel()])
+    return camera.unproject(pixels, depth.ravel()), raster.mask.ravel()
 
 
 def similarity(source: Float[Array, "n 3"], target: Float[Array, "n 3"]) -> Float[Array, "4 4"]:
-    """The similarity that takes source nearest to target in the least-squares sense (Umeyama)."""
-    a, b = source - source.mean(0), target - target.mean(0)
-    U, S, Vt = np.linalg.svd(b.T @ a)
-    flip = np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))])
-    R = U @ flip @ Vt
-    scale = (S * np.diag(flip)).sum() / (a * a).sum()
+    """The similarity that takes source nearest to target, as a matrix."""
+    found = estimate_similarity(source, target)
     T = np.eye(4)
-    T[:3, :3] = scale * R
-    T[:3, 3] = target.mean(0) - scale * R @ source.mean(0)
+    T[:3, :3], T[:3, 3] = found.scale * found.rotation, found.translation
     return T
 
 
@@ -144,65 +186,50 @@ def move(T: Float[Array, "4 4"], points: Float[Array, "n 3"]) -> Float[Array, "n
 
 
 def distance_to(
-    scan: Scan, points: Float[Array, "n 3"], start: Float[Array, "4 4"]
-) -> SurfaceError:
-    """ICP by a similarity (the worst 5 % dropped while aligning, none while reporting)."""
-    nearest = _NearestPoint(scan.surface)
-    T = start
-    for _ in range(200):
+    scan: Scan, points: Float[Array, "n 3"], T_start: Float[Array, "4 4"]
+) -> Comparison:
+    """Errors of a head's samples, (N, 3) mm, as T_start puts them on the scan and after ICP."""
+    T = iterate_closest_points(scan, points[:: max(1, len(points) // ALIGNING)], T_start)
+    before, after = (scan.nearest(move(matrix, points))[1] for matrix in (T_start, T))
+    return Comparison(SurfaceError.of(before), SurfaceError.of(after), T)
+
+
+def iterate_closest_points(
+    scan: Scan, points: Float[Array, "n 3"], T: Float[Array, "4 4"], *, rounds: int = 200
+) -> Float[Array, "4 4"]:
+    """ICP by a similarity, the worst 5 % dropped in every round, until nothing moves 0.002 mm."""
+    for _ in range(rounds):
         moved = move(T, points)
-        closest, distances = nearest(moved)
+        closest, distances = scan.nearest(moved)
         keep = distances <= np.quantile(distances, 1 - TRIM)
         step = similarity(moved[keep], closest[keep])
         T = step @ T
-        if np.abs(step - np.eye(4)).max() < 1e-5:
+        if np.abs(move(step, moved) - moved).max() < 2e-3:
             break
-    distances = nearest(move(T, points))[1]
-    return SurfaceError(
-        float(np.median(distances)), float(distances.mean()), float(np.quantile(distances, 0.95))
-    )
+    return T
 
 
-class _NearestPoint:
-    """Nearest points on a triangle mesh: exact among the triangles near the nearest samples."""
-
-    def __init__(self, surface: trimesh.Trimesh) -> None:
-        samples, self._faces = trimesh.sample.sample_surface_even(surface, 60_000, seed=0)
-        self._tree = cKDTree(samples)
-        self._triangles = np.asarray(surface.triangles)
-
-    def __call__(self, points: Float[Array, "n 3"]) -> tuple[Array, Array]:
-        candidates = self._faces[self._tree.query(points, k=3)[1]]
-        best = np.full(len(points), np.inf)
-        closest = np.zeros_like(points)
-        for column in candidates.T:
-            on_triangle = trimesh.triangles.closest_point(self._triangles[column], points)
-            distance = np.linalg.norm(on_triangle - points, axis=1)
-            nearer = distance < best
-            best[nearer], closest[nearer] = distance[nearer], on_triangle[nearer]
-        return closest, best
-
-
-def relative_rotation_error(cameras: dict[str, Camera], scan: Scan) -> list[float]:
-    """Degrees between the true and the fitted rotation from the first photo to each other one."""
+def relative_rotation_error(cameras: Mapping[str, Camera], scan: Scan) -> list[float]:
+    """Degrees between the true and the fitted turn from the first photo to each other one."""
     names = sorted(set(cameras) & set(scan.cameras))
-    errors = []
-    for name in names[1:]:
-        fitted = cameras[name].R_cam_head @ cameras[names[0]].R_cam_head.T
-        true = scan.cameras[name].R_cam_head @ scan.cameras[names[0]].R_cam_head.T
-        cosine = (np.trace(fitted @ true.T) - 1) / 2
-        errors.append(float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))))
-    return errors
+    fitted = [_straightened(cameras[name]) for name in names]
+    true = [_straightened(scan.cameras[name]) for name in names]
+    return [
+        float(np.degrees(angle_between(a @ fitted[0].T, b @ true[0].T)))
+        for a, b in zip(fitted[1:], true[1:], strict=True)
+    ]
 
 
-def _camera(entry: dict, unit: float) -> Camera:
-    K = np.array(entry["K"])
-    U, _, Vt = np.linalg.svd(np.array(entry["R"]))
-    return Camera(
-        entry["width"],
-        entry["height"],
-        float(K[0, 0] + K[1, 1]) / 2,
-        U @ Vt,
-        np.array(entry["t"]) * unit,
-        K[:2, 2],
-    )
+def _straightened(camera: Camera) -> Float[Array, "3 3"]:
+    """The rotation of the camera that looks along the ray through the image's centre.
+
+    A photo cropped off its centre shows nearly what a camera turned to that crop would, and a fit
+    that takes the image's centre for the principal point finds that camera.
+    """
+    centre = np.array([[camera.width / 2, camera.height / 2]])
+    x, y = ((centre - camera.principal) / camera.focal_px)[0]
+    forward = np.array([x, y, 1.0]) / np.linalg.norm([x, y, 1.0])
+    right = np.cross([0.0, 1.0, 0.0], forward)
+    right /= np.linalg.norm(right)
+    turned: Array = np.stack([right, np.cross(forward, right), forward]) @ camera.R_cam_head
+    return turned
