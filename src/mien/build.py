@@ -66,7 +66,12 @@ class Build:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user should know, in the order in which it was noticed."""
-        fitted = [note for fit in self.fits.values() for note in fit.notes]
+        several = len(self.fits) > 1
+        fitted = [
+            f"{name}: {note}" if several else note
+            for name, fit in self.fits.items()
+            for note in fit.notes
+        ]
         left_out = [f"{photo} was left out: {why}" for photo, why in self.head.left_out.items()]
         return (*self.capture.notes, *left_out, *fitted)
 
