@@ -140,9 +140,9 @@ def make_backdrop(
 
     Args:
         coarse: the skin on the cylinder. blend: the photos on it.
-        regions: (V,) soft masks by name; what they leave, and every region of which the photos
-            show next to nothing, is filled from everything but the ears; an ear that they do
-            not show, from the skin.
+        regions: (V,) soft masks by name; what they leave is filled from itself too. A region of
+            which the photos show next to nothing counts among the rest; an ear that they do not
+            show is filled from the skin.
     Raises: InputError: a mask that does not fit the mesh.
     """
     left = np.ones(len(mesh.vertices))
@@ -165,7 +165,9 @@ def make_backdrop(
             masks.append(mask)
             images.append(fill_image(own, fill, wrap=True))
             left = left - mask
-    rest = _within(blend, coarse, mesh, 1 - ears)
+    rest = _within(blend, coarse, mesh, left)
+    if rest.confidence.sum() < _FEWEST:
+        rest = _within(blend, coarse, mesh, 1 - ears)
     images.append(fill_image(rest if rest.confidence.any() else blend, fill, wrap=True))
     return Backdrop(cylinder, np.stack(images), np.stack([*masks, left]))
 
