@@ -11,6 +11,8 @@ from mien.errors import InputError
 
 NEUTRAL = "neutral"
 ANNOTATIONS = "annotations"
+_DOCUMENTS = frozenset({"COPYING", "CREDITS", "LICENCE", "LICENSE", "NOTICE", "README"})
+"""Files that often lie beside photos and that nobody takes for one."""
 
 
 def photo_files(source: Path) -> dict[str, list[Path]]:
@@ -72,7 +74,7 @@ def _subfolders(folder: Path) -> list[Path]:
 
 
 def _is_stray(path: Path) -> bool:
-    return path.is_file() and not _is_photo(path)
+    return path.is_file() and not _is_photo(path) and path.stem.upper() not in _DOCUMENTS
 
 
 def _is_photo(path: Path) -> bool:

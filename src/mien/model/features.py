@@ -26,6 +26,8 @@ SKIN_SIGMA_MM = 12.0
 """The same for one on plain skin, which the detector only guesses (docs/pose-recovery.md)."""
 MIN_CONFIDENCE = 0.1
 """Landmarks below are not used: the surface turns away there."""
+ENOUGH_NAMED = 8
+"""With so many named points in a photo its camera is found without its curves."""
 WINS_WITHIN_MM = 25.0
 """A hand-made mark silences the same photo's detector this far around it."""
 
@@ -125,6 +127,18 @@ def gather_features(views: Sequence[View], generic: GenericHead) -> Features:
         by_hand=np.isfinite(sigma) & (np.arange(image.shape[1]) < len(vertices)),
     )
     return _silence_landmarks(features, generic).of_photos(np.ones(len(views), bool))
+
+
+def image_points_for_cameras(features: Features) -> Float[Array, "k n 2"]:
+    """(K, N, 2) px, NaN for points of drawn curves in photos that have enough named ones.
+
+    Until cameras are known a curve's points are placed by arc length, which foreshortening
+    falsifies; P02 (sec. 5.1.3) leaves them out of the pose for the same reason.
+    """
+    drawn = features.by_hand & (features.sigma_mm == CURVE_SIGMA_MM)
+    named = features.by_hand & ~drawn
+    enough = named.sum(axis=1) >= ENOUGH_NAMED
+    return np.where((drawn & enough[:, None])[..., None], np.nan, features.image_points)
 
 
 def rematch_curves(

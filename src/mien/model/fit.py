@@ -14,7 +14,12 @@ from mien.capture.source import View
 from mien.errors import EstimationError
 from mien.model.adjust import Adjustment, FocalPrior, ShapePrior, adjust_bundle
 from mien.model.deform import eye_centers, vertex_uncertainty
-from mien.model.features import Features, gather_features, rematch_curves
+from mien.model.features import (
+    Features,
+    gather_features,
+    image_points_for_cameras,
+    rematch_curves,
+)
 from mien.model.pose import recover_pose
 from mien.model.rays import intersect_rays
 from mien.model.shape import shape_from_features
@@ -24,6 +29,7 @@ from mien.model.verdict import (
     depth_notes,
     find_misfit,
     judge_marks,
+    name_notes,
     typical_misfits,
 )
 
@@ -109,7 +115,8 @@ def fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions) 
         solution.deviation_mm,
         prior_mm=PRIOR_DEVIATION_MM,
     )
-    return Fit(vertices, photos, left_out, uncertainty, depth_notes(cameras))
+    notes = (*depth_notes(cameras), *name_notes(photos))
+    return Fit(vertices, photos, left_out, uncertainty, notes)
 
 
 def _misfit(
@@ -155,7 +162,7 @@ def _solve(
     """P02's five steps, then as often as asked for: curves, joint adjustment or rays, shape."""
     try:
         start = recover_pose(
-            features.image_points,
+            image_points_for_cameras(features),
             features.on(generic.mesh.vertices),
             np.array([view.photo.size for view in views]),
             weights=1 / features.sigma_mm**2,

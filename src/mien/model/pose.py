@@ -227,7 +227,8 @@ def _disagreeing_photo(
     worst = int(shares.argmin())
     if shares[worst] < _MIN_TRUSTED:
         return worst, f"only {100 * shares[worst]:.0f} % of its points agree with the other photos"
-    rms_mm = rms_per_photo(problem, solution, trusted) / solution.poses.s
+    # A photo of coarse marks may fit as much worse as its weights say.
+    rms_mm = rms_per_photo(problem, solution, trusted, weighted=True) / solution.poses.s
     worst = int(rms_mm.argmax())
     ratio = rms_mm[worst] / max(float(np.median(np.delete(rms_mm, worst))), 1e-9)
     if ratio > _MAX_RATIO and rms_mm[worst] > _MIN_MISFIT_MM:

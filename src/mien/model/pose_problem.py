@@ -129,9 +129,19 @@ def moved_too_far(
 
 
 def rms_per_photo(
-    problem: PoseProblem, solution: Alternation, trusted: Bool[Array, "k n"]
+    problem: PoseProblem,
+    solution: Alternation,
+    trusted: Bool[Array, "k n"],
+    *,
+    weighted: bool = False,
 ) -> Float[Array, " k"]:
-    """Root mean square length of each photo's trusted reprojection errors, px."""
+    """Root mean square length of each photo's trusted reprojection errors, px.
+
+    Args:
+        weighted: count an error as what it would be for an observation of the largest weight.
+    """
     squared = np.where(trusted, residual_lengths(problem, solution) ** 2, 0.0)
+    if weighted:
+        squared *= problem.weights / max(float(problem.weights.max()), np.finfo(float).tiny)
     rms: Array = np.sqrt(squared.sum(axis=1) / np.maximum(trusted.sum(axis=1), 1))
     return rms

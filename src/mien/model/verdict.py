@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,8 @@ DISTRUST_SIGMAS = 5.0
 MISFIT_SIGMAS, MISFIT_RATIO = 4.0, 3.0
 """A photo is left out when its marks lie, in the median, this many expected errors off, and this
 many times farther than the other photos'."""
+ASKING_SHARE = 0.35
+"""When more of a photo's hand marks are distrusted, their names may be wrong."""
 HOPELESS_SIGMAS = 12.0
 """When every photo's marks lie this far off, one of them spoils the head for all."""
 MIN_PARALLAX_DEG = 8.0
@@ -104,3 +106,17 @@ def depth_notes(cameras: Sequence[Camera]) -> tuple[str, ...]:
             f"faces, not from this person ({MIN_PARALLAX_DEG:.0f} degrees or more would show it)",
         )
     return ()
+
+
+def name_notes(photos: Mapping[str, PhotoFit]) -> tuple[str, ...]:
+    """Photos whose hand marks fit so badly that their names may be wrong."""
+    notes = []
+    for photo, fit in photos.items():
+        by_hand = [mark for mark in fit.marks if mark.by_hand]
+        distrusted = [mark for mark in by_hand if mark.verdict]
+        if len(distrusted) > ASKING_SHARE * len(by_hand):
+            notes.append(
+                f"{photo}: {len(distrusted)} of its {len(by_hand)} hand-made marks are distrusted: "
+                "are their names right, and left and right the subject's?"
+            )
+    return tuple(notes)

@@ -19,7 +19,7 @@ from mien.texture.surface import SurfaceMap
 # Two neighbouring pixels of the depth map that differ by more lie on different layers. One pixel
 # is a fraction of a millimetre wide: no surface that could be textured is so steep.
 _JUMP_MM = 3.0
-_STEEPEST = 2.75
+_STEEPEST = 4.0
 # What the camera sees of a surface steeper than this (80 degrees) is no use.
 _LEAST_CERTAINTY = 0.17
 
