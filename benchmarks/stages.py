@@ -41,7 +41,7 @@ class Run:
 
 
 def report(stages: Stages, peak: float) -> None:
-    """Ends a measured process: prints what `run_twice` reads."""
+    """Ends a measured process: prints what `run_measured` reads."""
     print(json.dumps({"seconds": stages.seconds, "peak_mb": peak}))
 
 
@@ -59,13 +59,13 @@ def peak_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
-def run_twice(module: str, arguments: Sequence[object]) -> Run:
-    """Runs `python -m module arguments` twice, the first for what compiles and is cached.
+def run_measured(module: str, arguments: Sequence[object], *, warm_up: bool = True) -> Run:
+    """What `python -m module arguments` measures, run once before for what compiles and is cached.
 
     Raises: CalledProcessError: it failed; what it said is on stderr.
     """
     command = [sys.executable, "-m", module, *map(str, arguments)]
-    for _ in range(2):
+    for _ in range(2 if warm_up else 1):
         begun = time.perf_counter()
         done = subprocess.run(command, stdout=subprocess.PIPE, check=True, cwd=_ROOT, text=True)
         whole = time.perf_counter() - begun
