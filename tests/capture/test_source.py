@@ -38,6 +38,7 @@ def test_folder_of_photos(tmp_path: Path, faces: dict[str, Array]) -> None:
     put(tmp_path / "p9.JPG", faces["right"], quality=95)
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / ".DS_Store").write_text("hidden")
+    (tmp_path / "LICENSE.txt").write_text("nobody takes this for a photo")
     annotate(tmp_path / "p10.png", [150, 320])
     seen: list[tuple[int, int]] = []
     capture = load_capture(

@@ -17,6 +17,7 @@ from mien.model.features import (
     WINS_WITHIN_MM,
     Features,
     gather_features,
+    image_points_for_cameras,
     rematch_curves,
 )
 from people import camera, drawn, person, photographed
@@ -172,3 +173,14 @@ def test_rematching_leaves_named_points_and_single_curves_alone() -> None:
     vertices = set(before.corners[moved.any(axis=0), 0])
     assert vertices <= set(GENERIC.polylines["left_jaw"]) - {GENERIC.vertex_of("left_jaw.3")}
     assert moved.any(axis=1).sum() == 1, "one photo is the reference"
+
+
+def test_cameras_start_without_the_curves_where_points_suffice() -> None:
+    """P02 sec. 5.1.3: curves refine the shape; arc length would falsify the cameras."""
+    few, many = list(GENERIC.points)[:4], list(GENERIC.points)[:ENOUGH_NAMED]
+    views = [photographed(PERSON, FRONT, points=p, curves=["hairline"]) for p in (few, many)]
+    features = gather_features(views, GENERIC)
+    used = np.isfinite(image_points_for_cameras(features)).all(axis=2)
+    assert used[0].sum() == features.seen[0].sum()
+    assert used[1].sum() == ENOUGH_NAMED
+    assert features.seen[1].sum() > ENOUGH_NAMED
