@@ -12,6 +12,7 @@ from mien.capture.source import View
 from mien.errors import InputError
 from mien.model.features import (
     CURVE_SIGMA_MM,
+    ENOUGH_NAMED,
     MIN_CONFIDENCE,
     POINT_SIGMA_MM,
     WINS_WITHIN_MM,
