@@ -15,8 +15,8 @@ from mien.model.rays import intersect_rays
 
 IDENTITY_SIGMA_MM = 3.0
 """How far a feature lies off the identity basis, its meaning on another face included."""
-SEEN_ONCE_SIGMA_MM = 3.0
-"""How well a feature that one photo shows tells the surface: its depth is a guess."""
+SEEN_ONCE_SIGMA_MM = 1.0
+"""How well at best a feature that one photo shows tells the surface: its depth is a guess."""
 
 
 def shape_from_features(
