@@ -93,6 +93,14 @@ def fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions) 
     Raises: EstimationError: no photo fits.
     Source: P02 sec. 5.1.
     """
+    from threadpoolctl import threadpool_limits
+
+    # The matrices are small: BLAS threads that wait for each other cost several times the work.
+    with threadpool_limits(1, user_api="blas"):
+        return _fit_views(views, generic, options)
+
+
+def _fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions) -> Fit:
     left_out: dict[str, str] = {}
     while True:
         solution = _solve(views, gather_features(views, generic), generic, options)
