@@ -82,7 +82,7 @@ def test_eyeballs_stay_round() -> None:
 
 
 def test_eye_centers_are_the_left_then_the_right() -> None:
-    left, right = eye_centers(HEAD, GENERIC)
+    left, right = eye_centers(GENERIC.mesh.with_vertices(HEAD))
     assert left[0] - right[0] == pytest.approx(63)
     assert left[0] == pytest.approx(-right[0])
 

@@ -126,7 +126,7 @@ def test_marks_tell_where_the_model_puts_them() -> None:
 def test_the_measured_distance_between_the_pupils_is_kept_exactly(distance: float) -> None:
     options = replace(QUICK, interpupillary_mm=distance)
     fit = fit_views(views_of(FIVE[1:4], points=MARKS), GENERIC, options)
-    left, right = eye_centers(fit.vertices, GENERIC)
+    left, right = eye_centers(GENERIC.mesh.with_vertices(fit.vertices))
     assert np.linalg.norm(left - right) == pytest.approx(distance, rel=1e-12)
     np.testing.assert_allclose(left + right, 0, atol=1e-9)
     # A scale of head and cameras together changes no picture.

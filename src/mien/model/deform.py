@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
+from mien.mesh import Mesh
 from mien.numeric.rbf import fit_rbf
 from mien.numeric.similarity import estimate_similarity
 
@@ -76,11 +77,10 @@ def _with_round_eyes(
     return result
 
 
-def eye_centers(vertices: Float[Array, "v 3"], generic: GenericHead) -> Float[Array, "2 3"]:
+def eye_centers(mesh: Mesh) -> Float[Array, "2 3"]:
     """(2, 3) mm: centres of the left and the right eyeball."""
-    mesh = generic.mesh
     balls = [np.unique(mesh.triangles[mesh.triangles_of(name)]) for name in _EYEBALLS]
-    return np.stack([vertices[ball].mean(axis=0) for ball in balls])
+    return np.stack([mesh.vertices[ball].mean(axis=0) for ball in balls])
 
 
 def vertex_uncertainty(

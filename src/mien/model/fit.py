@@ -258,7 +258,7 @@ def _in_head_space(
     solution: _Solution, generic: GenericHead, options: FitOptions
 ) -> tuple[Float[Array, "v 3"], tuple[Camera, ...]]:
     """The same picture with the origin between the eyes and the measured scale."""
-    eyes = eye_centers(solution.vertices, generic)
+    eyes = eye_centers(generic.mesh.with_vertices(solution.vertices))
     origin = eyes.mean(axis=0)
     scale = options.interpupillary_mm / float(np.linalg.norm(eyes[0] - eyes[1]))
     cameras = tuple(

@@ -10,6 +10,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, UInt8
 from mien.camera import Camera
+from mien.model.deform import eye_centers
 from mien.model.fit import Fit
 from mien.model.head import Head
 from mien.model.verdict import Mark, PhotoFit
@@ -42,12 +43,12 @@ def render_report(data: ReportInput) -> str:
     from jinja2 import Environment, PackageLoader
 
     page = Environment(loader=PackageLoader("mien.report", "."), autoescape=True)
-    eyes = _interpupillary(data.head)
+    left, right = eye_centers(data.head.mesh)
     return page.get_template("report.html.j2").render(
         title=f"{data.head.subject}: report of the build",
         version=data.head.generator.removeprefix("mien "),
         vertices=f"{len(data.head.mesh.vertices):,}",
-        interpupillary_mm=eyes,
+        interpupillary_mm=float(np.linalg.norm(left - right)),
         notes=data.notes,
         previews=preview_pictures(data.head),
         coverage=coverage_pictures(data.head, data.coverage),
@@ -106,13 +107,3 @@ def head_angles(camera: Camera) -> tuple[float, float, float]:
     pitch = np.degrees(np.arcsin(np.clip(-up[2], -1, 1)))
     roll = np.degrees(np.arctan2(-up[0], -up[1]))
     return float(yaw), float(pitch), float(roll)
-
-
-def _interpupillary(head: Head) -> float:
-    mesh = head.mesh
-    balls = [
-        np.unique(mesh.triangles[mesh.triangles_of(name)])
-        for name in ("left_eyeball", "right_eyeball")
-    ]
-    left, right = (mesh.vertices[ball].mean(axis=0) for ball in balls)
-    return float(np.linalg.norm(left - right))
