@@ -26,6 +26,7 @@ TRIM = 0.05
 """Share of the samples, the worst, that does not count while aligning; it does when reporting."""
 ALIGNING = 3000
 """How many samples take part in the alignment."""
+_SURFACES = (".obj", ".ply")
 
 
 @dataclass(frozen=True)
@@ -95,21 +96,50 @@ class Samples:
 
 
 def load_scan(folder: Path) -> Scan:
-    """The scan and cameras of a folder of development data (`james` or `emily`)."""
+    """The scan and cameras of a folder: `cameras_opencv.json` and one .obj or .ply in mm.
+
+    Also reads the development data of Emily, which are in cm and in a frame of their own.
+    """
     entries = json.loads((folder / "cameras_opencv.json").read_text(encoding="utf-8"))
-    if folder.name == "james":
-        unit, surface = 1.0, trimesh.load_mesh(folder / "james.obj", process=False)
-    else:
+    if "object_to_world" in entries:
         unit, path = 10.0, folder / "geometry" / "Emily_head_mesh.ply"
         surface = trimesh.load_mesh(path, process=False)
         surface.apply_transform(np.array(entries["object_to_world"]))
         surface.apply_scale(unit)
+    else:
+        unit, path = 1.0, next(p for p in sorted(folder.iterdir()) if p.suffix in _SURFACES)
+        surface = trimesh.load_mesh(path, process=False)
     cameras = {
         name: _camera(entry, unit)
         for name, entry in entries.items()
         if isinstance(entry, dict) and "K" in entry
     }
     return Scan(surface, cameras)
+
+
+def save_scan(folder: Path, mesh: Mesh, cameras: Mapping[str, Camera]) -> None:
+    """Writes `scan.ply` (mm) and `cameras_opencv.json` for load_scan; cameras by photo stem."""
+    surface = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
+    surface.export(folder / "scan.ply")
+    entries = {name: _entry(camera) for name, camera in cameras.items()}
+    text = json.dumps(entries, indent=1)
+    (folder / "cameras_opencv.json").write_text(text + "\n", encoding="utf-8")
+
+
+def scan_mesh(scan: Scan) -> Mesh:
+    """The scan's surface as a mesh."""
+    return Mesh(np.array(scan.surface.vertices), np.array(scan.surface.faces, np.int32))
+
+
+def _entry(camera: Camera) -> dict[str, object]:
+    x, y = camera.principal.tolist()
+    return {
+        "width": camera.width,
+        "height": camera.height,
+        "K": [[camera.focal_px, 0.0, x], [0.0, camera.focal_px, y], [0.0, 0.0, 1.0]],
+        "R": camera.R_cam_head.tolist(),
+        "t": camera.t_cam_head.tolist(),
+    }
 
 
 def _camera(entry: dict, unit: float) -> Camera:
@@ -153,7 +183,7 @@ def start_from_shared_pixels(
     scan: Scan, mesh: Mesh, camera: Camera, true_camera: Camera, *, height: int = 250
 ) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"]]:
     """Points of the head and of the scan that are seen through the same pixels of one photo."""
-    scanned = Mesh(np.array(scan.surface.vertices), np.array(scan.surface.faces, np.int32))
+    scanned = scan_mesh(scan)
     shown = mesh.submesh(mesh.triangles_of(*shown_parts(mesh)))
     factor = height / camera.height
     on_head, seen = _seen_points(shown, camera.resized(factor))
