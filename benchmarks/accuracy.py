@@ -5,32 +5,19 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.error_map import save_error_map
-from benchmarks.scan import (
-    Comparison,
-    Scan,
-    SurfaceError,
-    distance_to,
-    face_samples,
-    load_scan,
-    move,
-    relative_rotation_error,
-    similarity,
-    start_from_shared_pixels,
-)
+from benchmarks.outcome import Outcome, outcome_of, without_marks
+from benchmarks.scan import DATA, Scan, SurfaceError, load_scan
 from benchmarks.table import markdown_table, write_results
-from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead, load_generic_head
-from mien.camera import Camera
 from mien.capture.source import load_capture
 from mien.model.fit import FitOptions, fit_views
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 
 
@@ -60,60 +47,12 @@ CASES = (
 )
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """A fit beside the scan.
-
-    Attributes:
-        vertices: (V, 3) mm of the fitted head; unfitted: (V, 3) mm, the generic head laid on it.
-        fitted, generic: their errors at the same samples.
-        degrees: per photo after the first, error of its turn from the first.
-        focal: per photo, relative error of the focal length.
-    """
-
-    vertices: Float[Array, "v 3"]
-    unfitted: Float[Array, "v 3"]
-    fitted: Comparison
-    generic: Comparison
-    degrees: list[float]
-    focal: list[float]
-
-
 def measure(case: Case, scan: Scan, generic: GenericHead) -> Outcome:
     """Fits a head and lays it, and the generic head for comparison, on the scan."""
     views = load_capture(case.photos).views
     if not case.annotated:
-        views = tuple(replace(view, annotations=None) for view in views)
-    fit = fit_views(views, generic, FitOptions(adjust=case.adjust))
-    cameras = {Path(name).stem: photo.camera for name, photo in fit.photos.items()}
-    mesh = generic.mesh.with_vertices(fit.vertices)
-    attached = generic.landmark_positions(fit.vertices)[generic.landmark_attached]
-    samples = face_samples(mesh, list(cameras.values()), attached)
-    unfitted = move(similarity(generic.mesh.vertices, fit.vertices), generic.mesh.vertices)
-    frontal = min(cameras, key=lambda name: abs(_yaw(cameras[name])))
-
-    def compare(vertices: Float[Array, "v 3"]) -> Comparison:
-        shared = start_from_shared_pixels(
-            scan, mesh.with_vertices(vertices), cameras[frontal], scan.cameras[frontal]
-        )
-        return distance_to(scan, samples.on(vertices), similarity(*shared))
-
-    return Outcome(
-        vertices=fit.vertices,
-        unfitted=unfitted,
-        fitted=compare(fit.vertices),
-        generic=compare(unfitted),
-        degrees=relative_rotation_error(cameras, scan),
-        focal=[
-            abs(camera.focal_px / scan.cameras[name].focal_px - 1)
-            for name, camera in cameras.items()
-        ],
-    )
-
-
-def _yaw(camera: Camera) -> float:
-    x, _, z = camera.center
-    return float(np.arctan2(x, z))
+        views = without_marks(views)
+    return outcome_of(fit_views(views, generic, FitOptions(adjust=case.adjust)), scan, generic)
 
 
 HEADER = (

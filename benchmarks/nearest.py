@@ -65,7 +65,7 @@ def _halves(centroids: Float[Array, "f 3"], group: Int[Array, " g"]) -> list[Int
 
 
 def _boxes(corners: Float[Array, "f 3 3"], edges: Int[Array, " e"]) -> tuple[Array, Array]:
-    """(2 x leaves - 1, 3) lower and upper corners of the nodes' boxes; empty ones are inside out."""
+    """(2 x leaves - 1, 3) lower and upper corners of the nodes' boxes; inside out where empty."""
     leaves = len(edges) - 1
     low = np.full((2 * leaves - 1, 3), np.inf)
     high = -low

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.paint import Hits
-from benchmarks.scan import save_scan
-from benchmarks.subjects import DATA, Subject, emily, james, person
+from benchmarks.scan import DATA, save_scan
+from benchmarks.subjects import Subject, emily, james, person
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
@@ -25,7 +25,7 @@ from mien.formats.image import save_image
 from mien.numeric.rotation import rotation_from_vector
 from mien.render.shade import rasterize_mesh
 
-__all__ = ["SCENES", "Plan", "portrait_camera", "render_exactly", "write_scene"]
+__all__ = ["SCENES", "Plan", "degraded", "portrait_camera", "render_exactly", "write_scene"]
 
 TRUTH = "truth.npz"
 FINER = 3

@@ -20,6 +20,7 @@ from mien.numeric.rotation import angle_between
 from mien.numeric.similarity import estimate_similarity
 from mien.render.shade import rasterize_mesh, shown_parts
 
+DATA = Path(__file__).parents[2] / "shared" / "data"
 FACE_RADIUS_MM = 12.0
 """A face reaches this far around the landmarks' attachments."""
 TRIM = 0.05

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.paint import Paint, ProjectedPaint, Projector, TexturePaint
-from benchmarks.scan import load_scan, scan_mesh
+from benchmarks.scan import DATA, load_scan, scan_mesh
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.build import BuildOptions, build_head
@@ -24,9 +24,8 @@ from mien.model.head import ATLAS
 from mien.numeric.raster import interpolate
 from mien.render.shade import rasterize_mesh, shown_parts
 
-__all__ = ["Subject", "emily", "james", "person", "smooth_field"]
+__all__ = ["Subject", "emily", "james", "person", "person_vertices", "projector", "smooth_field"]
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
 DEMO = Path(__file__).parents[1] / "src" / "mien" / "assets" / "data" / "james"
 
 
@@ -87,7 +86,7 @@ def emily(data: Path = DATA / "emily") -> Subject:
     scan = load_scan(data)
     mesh = _with_balls(scan_mesh(scan), _EMILYS_EYES)
     projectors = tuple(
-        _projector(mesh, camera, load_photo(data / "renders_mentalray" / f"{name}.jpg").pixels)
+        projector(mesh, camera, load_photo(data / "renders_mentalray" / f"{name}.jpg").pixels)
         for name, camera in scan.cameras.items()
     )
     return Subject(
@@ -110,7 +109,7 @@ def _with_balls(mesh: Mesh, balls: Sequence[tuple[tuple[float, float, float], fl
     return Mesh(np.concatenate(vertices), np.concatenate(triangles))
 
 
-def _projector(
+def projector(
     mesh: Mesh,
     camera: Camera,
     photo: UInt8[Array, "h w 3"],
@@ -138,18 +137,12 @@ def _projector(
 
 
 def person(seed: int, texture_source: Path = DEMO) -> Subject:
-    """Somebody on mien's own mesh who never lived, in the skin of the person in some photos.
+    """Somebody who never lived, in the skin of the person in some photos.
 
-    Random identity coefficients, a random asymmetric deformation (2 mm RMS, 25 mm correlation
-    length) and bumps (0.3 mm RMS, 6 mm); shading by a fixed light from above and one side is
-    painted on.
+    Shading by a fixed light from above and one side is painted on.
     """
-    generic, rng = load_generic_head(), np.random.default_rng(seed)
-    coefficients = rng.normal(size=len(generic.identity.components))
-    vertices = generic.mesh.vertices + generic.identity.offsets(coefficients)
-    vertices = _deformed(vertices, generic, rng, rms_mm=2.0, length_mm=25.0)
-    vertices = _deformed(vertices, generic, rng, rms_mm=0.3, length_mm=6.0, parts=("skin",))
-    mesh = generic.mesh.with_vertices(vertices)
+    vertices = person_vertices(seed)
+    mesh = load_generic_head().mesh.with_vertices(vertices)
     built = build_head(texture_source, options=BuildOptions(texture_size=4096)).head
     return Subject(
         mesh.submesh(mesh.triangles_of(*shown_parts(mesh))),
@@ -159,6 +152,19 @@ def person(seed: int, texture_source: Path = DEMO) -> Subject:
         height_mm=290,
         vertices=vertices,
     )
+
+
+def person_vertices(seed: int) -> Float[Array, "v 3"]:
+    """(V, 3) mm of mien's own mesh: nobody whom the identity basis alone could describe.
+
+    Random identity coefficients, a random asymmetric deformation (2 mm RMS, 25 mm correlation
+    length) and bumps of the skin (0.3 mm RMS, 6 mm).
+    """
+    generic, rng = load_generic_head(), np.random.default_rng(seed)
+    coefficients = rng.normal(size=len(generic.identity.components))
+    vertices = generic.mesh.vertices + generic.identity.offsets(coefficients)
+    vertices = _deformed(vertices, generic, rng, rms_mm=2.0, length_mm=25.0)
+    return _deformed(vertices, generic, rng, rms_mm=0.3, length_mm=6.0, parts=("skin",))
 
 
 def smooth_field(
