@@ -191,9 +191,10 @@ def write_scene(folder: Path, plan: Plan) -> None:
         photos = degraded(photos, rng)
     for name, photo in zip(cameras, photos, strict=True):
         save_image(folder / f"{name}.png", photo)
-    save_scan(folder, subject.mesh, cameras)
     if subject.vertices is not None:
         np.savez_compressed(folder / TRUTH, vertices=subject.vertices)
+    # The cameras come last: a folder that has them is whole.
+    save_scan(folder, subject.mesh, cameras)
 
 
 def degraded(
@@ -222,7 +223,7 @@ def _with_expression(subject: Subject, expression: Mapping[str, float]) -> Subje
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Writes the scenes asked for, each into a folder of its name."""
+    """Writes each scene asked for into a folder of its name."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.rendered", description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("scenes", nargs="*", default=list(SCENES), metavar="SCENE")
