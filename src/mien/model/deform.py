@@ -47,7 +47,7 @@ def deform_head(
     deviation = np.broadcast_to(deviation_mm, len(places))
     smoothing = np.append(deviation**2, np.zeros(len(anchors))) / ROUGHNESS_MM2
     moved: Array = vertices + fit_rbf(centers, moves, kernel=kernel, smoothing=smoothing)(vertices)
-    return _with_round_eyes(moved, vertices, generic)
+    return with_round_eyes(moved, vertices, generic)
 
 
 def _far_vertices(
@@ -67,9 +67,10 @@ def _far_vertices(
     return np.array(chosen)
 
 
-def _with_round_eyes(
+def with_round_eyes(
     moved: Float[Array, "v 3"], before: Float[Array, "v 3"], generic: GenericHead
 ) -> Float[Array, "v 3"]:
+    """The moved head, each eyeball moved, turned and scaled as a whole."""
     result = moved.copy()
     for name in _EYEBALLS:
         ball = np.unique(generic.mesh.triangles[generic.mesh.triangles_of(name)])

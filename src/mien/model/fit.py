@@ -14,6 +14,8 @@ from mien.capture.source import View
 from mien.errors import EstimationError
 from mien.model.adjust import Adjustment, FocalPrior, ShapePrior, adjust_bundle
 from mien.model.deform import eye_centers, vertex_uncertainty
+from mien.model.dense.joint import Lenses
+from mien.model.dense.register import register_views
 from mien.model.features import (
     Features,
     gather_features,
@@ -74,6 +76,8 @@ class FitOptions:
     Attributes:
         adjust: joint bundle adjustment under the identity prior after P02's five steps; without it,
             cameras come from the five steps and shape from ray intersection alone, as in P02.
+        dense: register several photos by all the skin that they share; without it, and always for
+            one photo, marks and landmarks alone decide.
         curves: "epipolar" or "arc-length", how drawn curves become points (P02 sec. 5.1.3).
         kernel: radial basis of the deformation (numeric.rbf).
         interpupillary_mm: measured distance between the pupils, which sets the scale.
@@ -81,6 +85,7 @@ class FitOptions:
     """
 
     adjust: bool = True
+    dense: bool = True
     curves: str = "epipolar"
     kernel: str = "exponential"
     interpupillary_mm: float = 63.0
@@ -111,6 +116,8 @@ def _fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions)
         worst, why = misfit
         left_out[solution.views[worst].photo.name] = why
         views = [view for k, view in enumerate(solution.views) if k != worst]
+    if options.dense and options.adjust and len(solution.views) > 1:
+        solution = _registered(solution, generic)
     vertices, cameras = _in_head_space(solution, generic, options)
     sigma_px = solution.features.sigma_px(solution.cameras)
     photos = {}
@@ -125,6 +132,36 @@ def _fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions)
     )
     notes = (*depth_notes(cameras), *name_notes(photos))
     return Fit(vertices, photos, left_out, uncertainty, notes)
+
+
+def _registered(solution: _Solution, generic: GenericHead) -> _Solution:
+    """The same photos registered with each other by all the skin that they share."""
+    views = solution.views
+    focal = _focal_prior(views)
+    group = np.unique(_lenses(views), return_inverse=True)[1].reshape(-1)
+    count = np.bincount(group)
+    lenses = Lenses(
+        group,
+        np.bincount(group, np.log(focal.focal_px)) / count,
+        np.bincount(group, focal.deviation) / count,
+    )
+    registration = register_views(
+        views, solution.cameras, solution.vertices, solution.features, lenses, generic
+    )
+    return replace(
+        solution,
+        cameras=registration.cameras,
+        vertices=registration.vertices,
+        residuals=_residuals(solution.features, registration.cameras, registration.vertices),
+    )
+
+
+def _residuals(
+    features: Features, cameras: Sequence[Camera], vertices: Float[Array, "v 3"]
+) -> Float[Array, "k n 2"]:
+    projected = np.stack([camera.project(features.on(vertices)) for camera in cameras])
+    residuals: Array = projected - features.image_points
+    return residuals
 
 
 def _misfit(
@@ -196,8 +233,7 @@ def _solve(
         else:
             points, deviation = _intersect(features, cameras, features.on(vertices))
         vertices = shape_from_features(features, points, cameras, generic, kernel=options.kernel)
-    projected = np.stack([camera.project(features.on(vertices)) for camera in cameras])
-    residuals = projected - features.image_points
+    residuals = _residuals(features, cameras, vertices)
     return _Solution(views, features, cameras, vertices, residuals, deviation, problems)
 
 

@@ -1,0 +1,180 @@
+"""The surface between and beneath the smooth modes: each vertex along its normal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mien.arrays import Array, Float
+from mien.assets.generic import GenericHead
+from mien.camera import Camera
+from mien.mesh import Mesh
+from mien.model.deform import with_round_eyes
+from mien.model.dense.tracks import Tracks
+
+BENDING = 3.0
+"""How stiff the surface is: weight (mm^2) of its squared mean bending against squared offsets over
+their variance."""
+LEAST_SD_MM = 0.05
+"""No place is known better than this, however many photos agree."""
+_WRONG_SDS = 1.5
+_ROUNDS = 4
+_REACH_MM = 30.0
+_FAR_MM = 10.0
+"""A place may lie this far off the surface along the rays."""
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """How far the photos put N places off the surface.
+
+    Attributes:
+        along_normal: (N,) mm. sd: (N,) mm, by the errors of the image points alone.
+    """
+
+    along_normal: Float[Array, " n"]
+    sd: Float[Array, " n"]
+
+
+def measure_offsets(
+    tracks: Tracks, cameras: Sequence[Camera], mesh: Mesh, *, rounds: int = 4
+) -> Offsets:
+    """Places where their rays meet, cameras fixed, as offsets along the surface's normals."""
+    start = tracks.on(mesh.vertices)
+    normals = tracks.on(mesh.vertex_normals())
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    rotation = np.stack([camera.R_cam_head for camera in cameras])[tracks.photo]
+    shift = np.stack([camera.t_cam_head for camera in cameras])[tracks.photo]
+    focal = np.array([camera.focal_px for camera in cameras])[tracks.photo]
+    principal = np.stack([camera.principal for camera in cameras])[tracks.photo]
+    gather = _gather(tracks.place, len(start))
+    weak = np.eye(3) / _FAR_MM**2
+    places = start
+    for _ in range(rounds):
+        x, y, z = (np.einsum("mij,mj->mi", rotation, places[tracks.place]) + shift).T
+        scale = focal / z
+        residuals = np.column_stack([scale * x, scale * y]) + principal - tracks.image_points
+        by_point = np.zeros((len(x), 2, 3))
+        by_point[:, 0, 0] = by_point[:, 1, 1] = scale
+        by_point[:, 0, 2], by_point[:, 1, 2] = -scale * x / z, -scale * y / z
+        by_place = by_point @ rotation
+        squared = (residuals**2).sum(axis=1) / tracks.sigma_px**2
+        weighted = by_place / (tracks.sigma_px**2 * (1 + squared / 4))[:, None, None]
+        information = weak + (
+            gather @ (np.swapaxes(by_place, 1, 2) @ weighted).reshape(-1, 9)
+        ).reshape(-1, 3, 3)
+        gradient = gather @ np.einsum("mij,mi->mj", weighted, residuals)
+        gradient += (places - start) @ weak
+        covariance = np.linalg.inv(information)
+        places = places - np.einsum("nij,nj->ni", covariance, gradient)
+    offsets: Array = ((places - start) * normals).sum(axis=1)
+    sd = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariance, normals))
+    return Offsets(offsets, np.maximum(sd, LEAST_SD_MM))
+
+
+def move_surface(
+    vertices: Float[Array, "v 3"], tracks: Tracks, offsets: Offsets, generic: GenericHead
+) -> Float[Array, "v 3"]:
+    """The head moved along its normals to where the photos put it, smoothly.
+
+    Minimizes sum_n rho((b_n . h - offset_n) / sd_n) + BENDING * bending(h) over the offsets h of
+    the skin's vertices. Where no photo tells, h goes on smoothly and fades. What is not skin goes
+    with the skin near it; eyeballs stay round.
+    """
+    stiffness, skin = _stiffness(generic)
+    heights = _solve_heights(stiffness, skin, tracks, offsets)
+    mesh = generic.mesh.with_vertices(vertices)
+    normals = mesh.submesh(mesh.triangles_of("skin")).vertex_normals()
+    moves = heights[:, None] * normals
+    moved = vertices + _carried(moves, vertices, skin)
+    return with_round_eyes(moved, vertices, generic)
+
+
+def _solve_heights(
+    stiffness: Any, skin: Array, tracks: Tracks, offsets: Offsets
+) -> Float[Array, " v"]:
+    from scipy.sparse import csr_matrix, diags
+    from scipy.sparse.linalg import splu
+
+    count = stiffness.shape[0]
+    places = len(tracks.corners)
+    rows = np.repeat(np.arange(places), 3)
+    on_skin = np.where(skin[tracks.corners], tracks.barycentrics, 0.0)
+    spread = csr_matrix((on_skin.ravel(), (rows, tracks.corners.ravel())), shape=(places, count))
+    used = skin[tracks.corners].all(axis=1)
+    heights, left = np.zeros(count), offsets.along_normal
+    for _ in range(_ROUNDS):
+        weights = used / (offsets.sd**2 * (1 + (left / (_WRONG_SDS * offsets.sd)) ** 2))
+        matrix = (spread.T @ diags(weights) @ spread + stiffness).tocsc()
+        heights = splu(matrix).solve(spread.T @ (weights * offsets.along_normal))
+        left = offsets.along_normal - spread @ heights
+    return heights
+
+
+def _carried(
+    moves: Float[Array, "v 3"], vertices: Float[Array, "v 3"], skin: Array
+) -> Float[Array, "v 3"]:
+    """Vertices that are not skin go with the skin around them."""
+    distance, nearest = cKDTree(vertices[skin]).query(vertices[~skin], k=24)
+    weights = np.exp(-((distance / (distance[:, :1] + 5.0)) ** 2))
+    result = moves.copy()
+    near = moves[skin][nearest]
+    result[~skin] = (weights[..., None] * near).sum(axis=1) / weights.sum(axis=1)[:, None]
+    return result
+
+
+def _stiffness(generic: GenericHead) -> tuple[Any, Array]:
+    """(V, V) sparse: bending of a height field on the skin; (V,) which vertices are skin.
+
+    Source: the thin plate on a mesh, L^T M^-1 L with cotangent Laplacian L and areas M
+    (Botsch and Kobbelt, 2004).
+    """
+    from scipy.sparse import csr_matrix, diags
+
+    vertices = generic.mesh.vertices
+    triangles = generic.mesh.triangles[generic.mesh.triangles_of("skin")]
+    count = len(vertices)
+    skin = np.zeros(count, bool)
+    skin[triangles] = True
+    laplacian, areas = _laplacian(vertices, triangles)
+    bending = laplacian.T @ diags(1 / areas) @ laplacian
+    # Far from all data the height fades: a spring that is felt over _REACH_MM.
+    fade = areas * BENDING / _REACH_MM**4
+    fade[~skin] = 1.0
+    return csr_matrix(BENDING * bending + diags(fade)), skin
+
+
+def _laplacian(vertices: Array, triangles: Array) -> tuple[Any, Array]:
+    """Cotangent Laplacian (V, V) and each vertex's area, mm^2."""
+    from scipy.sparse import csr_matrix, diags
+
+    count = len(vertices)
+    rows, columns, values = [], [], []
+    areas = np.zeros(count)
+    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        u = vertices[triangles[:, b]] - vertices[triangles[:, a]]
+        v = vertices[triangles[:, c]] - vertices[triangles[:, a]]
+        twice_area = np.linalg.norm(np.cross(u, v), axis=1)
+        # Slivers have cotangents without bound.
+        cotangent = np.clip((u * v).sum(axis=1) / np.maximum(twice_area, 1e-9), 0.02, 5.0) / 2
+        rows += [triangles[:, b], triangles[:, c]]
+        columns += [triangles[:, c], triangles[:, b]]
+        values += [cotangent, cotangent]
+        np.add.at(areas, triangles[:, a], twice_area / 6)
+    weights = csr_matrix(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
+        shape=(count, count),
+    )
+    degree = diags(np.asarray(weights.sum(axis=1)).ravel())
+    return degree - weights, np.maximum(areas, 1e-3)
+
+
+def _gather(index: Array, count: int) -> Any:
+    from scipy.sparse import csr_matrix
+
+    size = len(index)
+    return csr_matrix((np.ones(size), (index, np.arange(size))), shape=(count, size))
