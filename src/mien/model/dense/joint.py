@@ -28,8 +28,8 @@ _LONGEST_STEP = 0.3
 _SETTLING = 2
 """Steps of the places alone after each common step: without them, places that lag behind their
 cameras drive the next step astray, and the iteration can diverge."""
-POSE_SD = np.array([0.15, 0.15, 0.15, 30.0, 30.0, 0.6])
-"""How far a camera lies from its start: rotation (rad), x and y (mm), log depth."""
+POSE_SD = np.array([0.1, 0.1, 0.1, 30.0, 30.0, 0.6])
+"""How far a camera lies from where landmarks put it: rotation (rad); x and y (mm), log depth."""
 _SPREAD = 1.5
 """While the residuals' median is larger than expected, so is the scale at which they count as
 wrong: this many medians."""
@@ -115,6 +115,7 @@ def solve_jointly(
     prior: PlacePrior,
     lenses: Lenses,
     *,
+    anchors: Float[Array, "k 3 3"] | None = None,
     iterations: int = 12,
     tolerance: float = 3e-4,
 ) -> JointSolution:
@@ -122,10 +123,12 @@ def solve_jointly(
 
     Args:
         cameras: K starts. places: (N, 3) mm start.
+        anchors: (K, 3, 3) R_cam_head that the rotations are believed to lie about; those of the
+            starts unless given.
         tolerance: radians and relative changes below which a step is next to nothing.
     Raises: EstimationError: the equations have no solution.
     """
-    problem = _Problem(cameras, sightings, prior, lenses)
+    problem = _Problem(cameras, sightings, prior, lenses, anchors)
     state = problem.start(cameras, places)
     converged = False
     for _ in range(iterations):
@@ -169,12 +172,15 @@ class _Problem:
         sightings: Sightings,
         prior: PlacePrior,
         lenses: Lenses,
+        anchors: Float[Array, "k 3 3"] | None,
     ) -> None:
         self.seen, self.prior, self.lenses = sightings, prior, lenses
         principal = np.stack([camera.principal for camera in cameras])
         self.image = sightings.image_points - principal[sightings.photo]
         self.photos = len(cameras)
-        self.start_R = np.stack([camera.R_cam_head for camera in cameras])
+        if anchors is None:
+            anchors = np.stack([camera.R_cam_head for camera in cameras])
+        self.anchor_R = anchors
         self.start_t = np.stack([camera.t_cam_head for camera in cameras])
         self.size = POSE * len(cameras) + len(lenses.log_focal)
         pose = POSE * sightings.photo[:, None] + np.arange(POSE)
@@ -301,7 +307,7 @@ class _Problem:
 
     def _add_cameras(self, common: Array, right: Array, state: _State) -> None:
         """What is known of poses (by their starts) and of focal lengths."""
-        turned = rotation_to_vector(state.R @ np.swapaxes(self.start_R, 1, 2))
+        turned = rotation_to_vector(state.R @ np.swapaxes(self.anchor_R, 1, 2))
         shifted = state.t[:, :2] - self.start_t[:, :2]
         depth = np.log(state.t[:, 2:] / self.start_t[:, 2:])
         off = np.concatenate([turned, shifted, depth], axis=1).ravel()

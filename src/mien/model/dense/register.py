@@ -69,13 +69,14 @@ def register_views(
     prior = load_head_prior()
     tell = progress or (lambda done, total: None)
     cameras = tuple(cameras)
+    anchors = np.stack([camera.R_cam_head for camera in cameras])
     scales = _scales(cameras)
     for step, scale in enumerate(scales):
         tell(step, len(scales) + 1)
         for _ in range(COARSE_ROUNDS if step == 0 else 1):
             mesh = visible_mesh(generic, vertices)
             tracks = find_tracks(views, cameras, mesh, mm_per_px=scale, places=PLACES)
-            solution = _solve(tracks, cameras, vertices, features, lenses, generic, prior)
+            solution = _solve(tracks, cameras, anchors, vertices, features, lenses, generic, prior)
             turned = max(
                 angle_between(a.R_cam_head, b.R_cam_head)
                 for a, b in zip(cameras, solution.cameras, strict=True)
@@ -112,6 +113,7 @@ def _moved(
 def _solve(
     tracks: Tracks,
     cameras: Sequence[Camera],
+    anchors: Float[Array, "k 3 3"],
     vertices: Float[Array, "v 3"],
     features: Features,
     lenses: Lenses,
@@ -141,7 +143,7 @@ def _solve(
     )
     components = np.ascontiguousarray(np.swapaxes(on(prior.components), 0, 1))
     beliefs = PlacePrior(on(prior.mean), components, precision)
-    return solve_jointly(cameras, on(vertices), sightings, beliefs, lenses)
+    return solve_jointly(cameras, on(vertices), sightings, beliefs, lenses, anchors=anchors)
 
 
 def _track_precision(
