@@ -30,9 +30,9 @@ _SETTLING = 2
 cameras drive the next step astray, and the iteration can diverge."""
 POSE_SD = np.array([0.1, 0.1, 0.1, 30.0, 30.0, 0.6])
 """How far a camera lies from where landmarks put it: rotation (rad); x and y (mm), log depth."""
-_SPREAD = 1.5
-"""While the residuals' median is larger than expected, so is the scale at which they count as
-wrong: this many medians."""
+_EXPECTED_MEDIAN = 0.5
+"""Of the residuals over their sigmas, where matches are as good as on sharp photos. Where they are
+not (small, compressed or moving faces), all sigmas grow until it is met."""
 
 
 @dataclass(frozen=True)
@@ -362,10 +362,10 @@ class _Problem:
         return projected, by_camera, by_point @ rotation
 
     def _weights(self, residuals: Float[Array, "m 2"]) -> Float[Array, " m"]:
-        sigma = self.seen.sigma_px
-        squared = (residuals**2).sum(axis=1) / sigma**2
-        scale = max(1.0, _SPREAD * float(np.sqrt(np.median(squared))))
-        weights: Array = 1 / (sigma**2 * (1 + squared / scale**2))
+        squared = (residuals**2).sum(axis=1) / self.seen.sigma_px**2
+        noise = matching_noise(np.sqrt(squared[self.seen.guides]))
+        variance = self.seen.sigma_px**2 * np.where(self.seen.guides, noise**2, 1.0)
+        weights: Array = 1 / (variance + (residuals**2).sum(axis=1))
         return weights
 
     def _couple(self, blocks: Float[Array, "m 7 3"]) -> Float[Array, "n d 3"]:
@@ -376,6 +376,12 @@ class _Problem:
     def _deform(self, coefficients: Float[Array, " c"]) -> Float[Array, "n 3"]:
         moved: Array = np.einsum("nci,c->ni", self.prior.components, coefficients)
         return moved
+
+
+def matching_noise(off_sigmas: Float[Array, " m"]) -> float:
+    """How many times larger than they are taken for the errors of matches are, at least 1."""
+    median = float(np.median(off_sigmas)) if len(off_sigmas) else 0.0
+    return max(1.0, median / _EXPECTED_MEDIAN)
 
 
 def _apply(matrices: Float[Array, "n 3 3"], vectors: Float[Array, "n 3"]) -> Float[Array, "n 3"]:

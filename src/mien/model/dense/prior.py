@@ -65,7 +65,30 @@ def make_head_prior(generic: GenericHead) -> HeadPrior:
             # Even and odd modes carry half of the variance each.
             moved[..., axis] = np.sqrt(2) * sd * modes
             components.append(moved)
-    return HeadPrior(generic.mesh.vertices, frozen(np.concatenate(components)))
+    stacked = _without_similarities(np.concatenate(components), generic)
+    return HeadPrior(generic.mesh.vertices, frozen(stacked))
+
+
+def _without_similarities(
+    components: Float[Array, "c v 3"], generic: GenericHead
+) -> Float[Array, "c v 3"]:
+    """The components less what moves, turns or scales the face as a whole.
+
+    Photos do not tell these from a move of the cameras. Left in, they would leave the joint
+    solution's frame and scale to drift; taken out, the mean head fixes both.
+    """
+    vertices = generic.mesh.vertices
+    fields = np.zeros((7, *vertices.shape))
+    fields[:3] = np.eye(3)[:, None]
+    fields[3:6] = np.cross(np.eye(3)[:, None], vertices)
+    fields[6] = vertices
+    face = np.sqrt(generic.regions["face"])[:, None]
+    held = (fields * face).reshape(7, -1).T
+    shares = np.linalg.lstsq(held, (components * face).reshape(len(components), -1).T, rcond=None)[
+        0
+    ]
+    free: Array = components - np.tensordot(shares.T, fields, 1)
+    return free
 
 
 def _spatial_modes(generic: GenericHead, sign: int) -> Float[Array, "m v"]:

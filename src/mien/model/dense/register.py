@@ -128,7 +128,7 @@ def _solve(
         photo=np.append(tracks.photo, photo),
         place=np.append(tracks.place, feature + len(tracks.corners)),
         image_points=np.concatenate([tracks.image_points, features.image_points[photo, feature]]),
-        sigma_px=np.append(tracks.sigma_px, sigma),
+        sigma_px=np.append(tracks.sigma_px * np.sqrt(tracks.crowding)[tracks.place], sigma),
         guides=np.append(np.ones(len(tracks.photo), bool), features.by_hand[photo, feature]),
     )
 

@@ -14,6 +14,7 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.mesh import Mesh
 from mien.model.deform import with_round_eyes
+from mien.model.dense.joint import matching_noise
 from mien.model.dense.tracks import Tracks
 
 BENDING = 3.0
@@ -73,6 +74,8 @@ def measure_offsets(
         places = places - np.einsum("nij,nj->ni", covariance, gradient)
     offsets: Array = ((places - start) * normals).sum(axis=1)
     sd = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariance, normals))
+    # Places that share a patch of the matching share its error.
+    sd *= matching_noise(np.sqrt(squared)) * np.sqrt(tracks.crowding)
     return Offsets(offsets, np.maximum(sd, LEAST_SD_MM))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from mien.model.dense.neighbours import choose_pairs
 
 MATCH_SIGMA_PX = 0.04
 """Error of a good match, in px of the crop; half of what a round trip misses comes on top."""
+_PATCH_PX, _LEAST_STEP_PX = 8, 2
+"""Side of what is matched at once, and how near to each other two places are followed at most."""
 _CANDIDATES = 4
 """Places looked at for each that is wanted: many are seen once, or not found again."""
 
@@ -30,6 +32,7 @@ class Tracks:
         reference: (N,) the photo in which the place was chosen, and observed exactly.
         photo, place: (M,) what observation m shows, and where it is seen.
         image_points: (M, 2) px of that photo. sigma_px: (M,) its error there.
+        crowding: (N,) how many places share a patch of the matching, and with it its error.
     """
 
     corners: Int[Array, "n 3"]
@@ -39,6 +42,7 @@ class Tracks:
     place: Int[Array, " m"]
     image_points: Float[Array, "m 2"]
     sigma_px: Float[Array, " m"]
+    crowding: Float[Array, " n"]
 
     def on(self, values: Float[Array, "... v c"]) -> Float[Array, "... n c"]:
         """Per-vertex values at the places."""
@@ -57,6 +61,7 @@ class Tracks:
             number[self.place[kept]],
             self.image_points[kept],
             self.sigma_px[kept],
+            self.crowding[keep],
         )
 
 
@@ -79,103 +84,107 @@ def find_tracks(
         mesh: what the photos show (crops.visible_mesh). mm_per_px: scale at which to match.
         places: about how many to follow, over all photos.
     """
-    crops = [
-        crop_view(view, camera, mesh, mm_per_px)
-        for view, camera in zip(views, cameras, strict=True)
-    ]
-    normals = mesh.vertex_normals()
-    seen = [None if crop is None else Sight.of(crop, mesh, normals) for crop in crops]
     share = places / max(1, len(views))
-    grids = [None if view is None else _grid(view, _CANDIDATES * share) for view in seen]
-    gathered = [_Observations(k) for k in range(len(views))]
+    normals = mesh.vertex_normals()
+    gathered: list[_Observations | None] = []
+    for k, (view, camera) in enumerate(zip(views, cameras, strict=True)):
+        crop = crop_view(view, camera, mesh, mm_per_px)
+        sight = None if crop is None else Sight.of(crop, mesh, normals)
+        gathered.append(
+            None if sight is None else _Observations(k, sight, _Grid.on(sight, _CANDIDATES * share))
+        )
     for a, b in choose_pairs(cameras, neighbours):
-        one, other = seen[a], seen[b]
+        one, other = gathered[a], gathered[b]
         if one is None or other is None:
             continue
-        there, back = match_sights(one, other), match_sights(other, one)
+        there, back = match_sights(one.view, other.view), match_sights(other.view, one.view)
         if there is None or back is None:
             continue
-        gathered[a].add(b, grids[a], check_match(there, back), other.crop)
-        gathered[b].add(a, grids[b], check_match(back, there), one.crop)
-    return _assembled(gathered, seen, grids, mesh, round(share))
+        one.add(b, check_match(there, back), other.view.crop)
+        other.add(a, check_match(back, there), one.view.crop)
+    parts = [seen.tracks(mesh, round(share)) for seen in gathered if seen and seen.photos]
+    return _joined(parts) if parts else _NOTHING
 
 
-def _grid(view: Sight, count: float) -> tuple[Int[Array, " g"], Int[Array, " g"]]:
-    """Rows and columns of about so many pixels of the head, evenly spread."""
-    step = max(1, int(np.sqrt(np.count_nonzero(view.usable) / max(count, 1))))
-    rows, columns = np.nonzero(view.usable[step // 2 :: step, step // 2 :: step])
-    return rows * step + step // 2, columns * step + step // 2
+@dataclass(frozen=True)
+class _Grid:
+    """Evenly spread pixels of the head: rows and columns (G,), so many px apart."""
+
+    rows: Int[Array, " g"]
+    columns: Int[Array, " g"]
+    step: int
+
+    @classmethod
+    def on(cls, view: Sight, count: float) -> _Grid:
+        """About `count` of them."""
+        wanted = int(np.sqrt(np.count_nonzero(view.usable) / max(count, 1)))
+        step = max(_LEAST_STEP_PX, wanted)
+        first = step // 2
+        rows, columns = np.nonzero(view.usable[first::step, first::step])
+        return cls(rows * step + first, columns * step + first, step)
 
 
 class _Observations:
     """What the neighbours of one photo see of its grid."""
 
-    def __init__(self, photo: int) -> None:
-        self.photo = photo
+    def __init__(self, photo: int, view: Sight, grid: _Grid) -> None:
+        self.photo, self.view, self.grid = photo, view, grid
         self.photos: list[int] = []
         self.good: list[Array] = []
         self.places: list[Array] = []
         self.sigma: list[Array] = []
 
-    def add(
-        self, photo: int, grid: tuple[Array, Array] | None, match: tuple[Match, Array], crop: Crop
-    ) -> None:
+    def add(self, photo: int, match: tuple[Match, Array], crop: Crop) -> None:
+        """What `photo`, seen as `crop`, shows of the grid, and by how much the way back misses."""
+        at = self.grid.rows, self.grid.columns
         found, miss = match
         self.photos.append(photo)
-        self.good.append(found.good[grid])
-        self.places.append(crop.to_photo(found.places[grid]))
-        self.sigma.append((MATCH_SIGMA_PX + miss[grid] / 2) / crop.scale.mean())
+        self.good.append(found.good[at])
+        self.places.append(crop.to_photo(found.places[at]))
+        self.sigma.append((MATCH_SIGMA_PX + miss[at] / 2) / crop.scale.mean())
+
+    def tracks(self, mesh: Mesh, most: int) -> Tracks:
+        """At most so many places that another photo sees."""
+        found = np.any(self.good, axis=0)
+        kept = _thinned(found, most)
+        number = np.cumsum(kept) - 1
+        count = int(kept.sum())
+        rows, columns = self.grid.rows[kept], self.grid.columns[kept]
+        crop = self.view.crop
+        own = (
+            np.full(count, self.photo),
+            np.arange(count),
+            crop.to_photo(np.column_stack([columns, rows]) + 0.5),
+            np.full(count, MATCH_SIGMA_PX / crop.scale.mean()),
+        )
+        others = []
+        for photo, good, places, sigma in zip(
+            self.photos, self.good, self.places, self.sigma, strict=True
+        ):
+            at = np.flatnonzero(good & kept)
+            others.append((np.full(len(at), photo), number[at], places[at], sigma[at]))
+        columns_of = zip(own, *others, strict=True)
+        photo_of, place, image, sigma_px = (np.concatenate(column) for column in columns_of)
+        area = self.grid.step**2 * np.count_nonzero(found) / max(count, 1)
+        return Tracks(
+            corners=mesh.triangles[crop.raster.triangle_ids[rows, columns]],
+            barycentrics=crop.raster.barycentrics[rows, columns].astype(np.float64),
+            reference=own[0],
+            photo=photo_of,
+            place=place,
+            image_points=image,
+            sigma_px=sigma_px,
+            crowding=np.full(count, max(1.0, _PATCH_PX**2 / max(area, 1e-9))),
+        )
 
 
-def _assembled(
-    gathered: list[_Observations],
-    seen: list[Sight | None],
-    grids: list[tuple[Array, Array] | None],
-    mesh: Mesh,
-    most: int,
-) -> Tracks:
-    parts: list[Tracks] = []
-    first = 0
-    for observations in gathered:
-        view, grid = seen[observations.photo], grids[observations.photo]
-        if view is None or grid is None or not observations.photos:
-            continue
-        kept = _thinned(np.any(observations.good, axis=0), most)
-        number = first + np.cumsum(kept) - 1
-        first += int(kept.sum())
-        rows, columns = grid[0][kept], grid[1][kept]
-        crop = view.crop
-        own = crop.to_photo(np.column_stack([columns, rows]) + 0.5)
-        count = len(rows)
-        found = [np.flatnonzero(good & kept) for good in observations.good]
-        seen_by = [
-            (np.full(len(at), k), at, xy[at], sd[at])
-            for k, at, xy, sd in zip(
-                observations.photos, found, observations.places, observations.sigma, strict=True
-            )
-        ]
-        reference = np.full(count, observations.photo)
-        exact = np.full(count, MATCH_SIGMA_PX / crop.scale.mean())
-        photo, at, image, sigma = (
-            np.concatenate(column)
-            for column in zip((reference, np.flatnonzero(kept), own, exact), *seen_by, strict=True)
-        )
-        parts.append(
-            Tracks(
-                corners=mesh.triangles[crop.raster.triangle_ids[rows, columns]],
-                barycentrics=crop.raster.barycentrics[rows, columns].astype(np.float64),
-                reference=reference,
-                photo=photo,
-                place=number[at],
-                image_points=image,
-                sigma_px=sigma,
-            )
-        )
-    if not parts:
-        return _no_tracks()
-    return Tracks(
-        *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Tracks))
-    )
+def _joined(parts: list[Tracks]) -> Tracks:
+    first = np.cumsum([0, *(len(part.corners) for part in parts)])
+    numbered = [
+        replace(part, place=part.place + start) for part, start in zip(parts, first, strict=False)
+    ]
+    names = [field.name for field in fields(Tracks)]
+    return Tracks(*(np.concatenate([getattr(part, name) for part in numbered]) for name in names))
 
 
 def _thinned(found: Bool[Array, " g"], most: int) -> Bool[Array, " g"]:
@@ -188,14 +197,13 @@ def _thinned(found: Bool[Array, " g"], most: int) -> Bool[Array, " g"]:
     return kept
 
 
-def _no_tracks() -> Tracks:
-    none = np.zeros(0, np.int64)
-    return Tracks(
-        np.zeros((0, 3), np.int64),
-        np.zeros((0, 3)),
-        none,
-        none,
-        none,
-        np.zeros((0, 2)),
-        np.zeros(0),
-    )
+_NOTHING = Tracks(
+    corners=np.zeros((0, 3), np.int64),
+    barycentrics=np.zeros((0, 3)),
+    reference=np.zeros(0, np.int64),
+    photo=np.zeros(0, np.int64),
+    place=np.zeros(0, np.int64),
+    image_points=np.zeros((0, 2)),
+    sigma_px=np.zeros(0),
+    crowding=np.zeros(0),
+)
