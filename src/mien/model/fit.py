@@ -124,14 +124,8 @@ def _fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions)
     for k, (view, camera) in enumerate(zip(solution.views, cameras, strict=True)):
         marks = judge_marks(solution.features, k, solution.residuals[k], sigma_px[k])
         photos[view.photo.name] = PhotoFit(camera, marks)
-    uncertainty = vertex_uncertainty(
-        solution.vertices,
-        solution.features.on(solution.vertices),
-        solution.deviation_mm,
-        prior_mm=PRIOR_DEVIATION_MM,
-    )
-    notes = (*depth_notes(cameras), *name_notes(photos))
-    return Fit(vertices, photos, left_out, uncertainty, notes)
+    notes = (*depth_notes(cameras), *solution.notes, *name_notes(photos))
+    return Fit(vertices, photos, left_out, solution.uncertainty_mm, notes)
 
 
 def _registered(solution: _Solution, generic: GenericHead) -> _Solution:
@@ -148,11 +142,14 @@ def _registered(solution: _Solution, generic: GenericHead) -> _Solution:
     registration = register_views(
         views, solution.cameras, solution.vertices, solution.features, lenses, generic
     )
+    names = [view.photo.name for view in views]
     return replace(
         solution,
         cameras=registration.cameras,
         vertices=registration.vertices,
         residuals=_residuals(solution.features, registration.cameras, registration.vertices),
+        uncertainty_mm=registration.deviation_mm,
+        notes=registration.quality.notes(names),
     )
 
 
@@ -190,8 +187,9 @@ class _Solution:
     cameras: tuple[Camera, ...]
     vertices: Float[Array, "v 3"]
     residuals: Float[Array, "k n 2"]
-    deviation_mm: Float[Array, " n"]
+    uncertainty_mm: Float[Array, " v"]
     problems: dict[str, str]
+    notes: tuple[str, ...] = ()
 
     @property
     def typical_misfits(self) -> Float[Array, " k"]:
@@ -234,7 +232,10 @@ def _solve(
             points, deviation = _intersect(features, cameras, features.on(vertices))
         vertices = shape_from_features(features, points, cameras, generic, kernel=options.kernel)
     residuals = _residuals(features, cameras, vertices)
-    return _Solution(views, features, cameras, vertices, residuals, deviation, problems)
+    uncertainty = vertex_uncertainty(
+        vertices, features.on(vertices), deviation, prior_mm=PRIOR_DEVIATION_MM
+    )
+    return _Solution(views, features, cameras, vertices, residuals, uncertainty, problems)
 
 
 def _adjust(

@@ -29,10 +29,12 @@ class HeadPrior:
 
     Attributes:
         mean: (V, 3) mm. components: (C, V, 3) mm: the identity basis, then smooth modes.
+        identity_count: how many of them are the identity basis.
     """
 
     mean: Float[Array, "v 3"]
     components: Float[Array, "c v 3"]
+    identity_count: int
 
     def vertices(self, coefficients: Float[Array, " c"]) -> Float[Array, "v 3"]:
         """(V, 3) mm of the head with these coefficients."""
@@ -66,7 +68,7 @@ def make_head_prior(generic: GenericHead) -> HeadPrior:
             moved[..., axis] = np.sqrt(2) * sd * modes
             components.append(moved)
     stacked = _without_similarities(np.concatenate(components), generic)
-    return HeadPrior(generic.mesh.vertices, frozen(stacked))
+    return HeadPrior(generic.mesh.vertices, frozen(stacked), len(generic.identity.components))
 
 
 def _without_similarities(

@@ -11,11 +11,14 @@ from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.source import View
+from mien.mesh import Mesh
 from mien.model.dense.crops import finest_mm_per_px, visible_mesh
 from mien.model.dense.joint import JointSolution, Lenses, PlacePrior, Sightings, solve_jointly
 from mien.model.dense.prior import HeadPrior, load_head_prior
-from mien.model.dense.surface import measure_offsets, move_surface
+from mien.model.dense.quality import Quality, judge_registration
+from mien.model.dense.surface import Offsets, measure_offsets, move_surface
 from mien.model.dense.tracks import Tracks, find_tracks
+from mien.model.dense.uncertainty import vertex_deviation
 from mien.model.features import Features
 from mien.numeric.rotation import angle_between
 
@@ -30,13 +33,15 @@ ALONG_SD_MM, ACROSS_SD_MM = 10.0, 1.0
 slid) and across it."""
 HAIR_SD_MM = 10.0
 """Across the surface where hair covers it."""
+INDEPENDENT_PLACES = 150
+"""What the prior does not express goes together over 15 to 20 mm of skin: however many places are
+followed on a face, they tell no more of the prior's coefficients than so many."""
 ATTACHED_SD_MM = 1.5
 """How far a landmark's or mark's place lies off its attachment on the prior."""
 LANDMARK_SHARE = 4.0
 """Landmarks err together, not each by itself: so many times their sigma."""
 SETTLED_RAD = np.deg2rad(1.0)
 COARSE_ROUNDS = 4
-ENOUGH_PLACES = 150
 
 
 @dataclass(frozen=True)
@@ -45,14 +50,14 @@ class Registration:
 
     Attributes:
         cameras: one a photo. vertices: (V, 3) mm, in the prior's frame and scale.
-        solution: of the last joint solve. tracks: what it rests on, and the last look's.
+        deviation_mm: (V,) standard deviation of each vertex, all axes together.
+        quality: what the photos say of each other.
     """
 
     cameras: tuple[Camera, ...]
     vertices: Float[Array, "v 3"]
-    solution: JointSolution
-    tracks: Tracks
-    fine: Tracks
+    deviation_mm: Float[Array, " v"]
+    quality: Quality
 
 
 def register_views(
@@ -65,32 +70,114 @@ def register_views(
     *,
     progress: Callable[[int, int], None] | None = None,
 ) -> Registration:
-    """Cameras and shape from all the skin that the photos share."""
-    prior = load_head_prior()
+    """Cameras and shape from all the skin that the photos share, from coarse to fine.
+
+    Args:
+        cameras, vertices: from landmarks, within some 15 degrees.
+        features: landmarks and marks of the same photos; landmarks tell which place of the mesh
+            is which, marks the cameras as well.
+    """
     tell = progress or (lambda done, total: None)
-    cameras = tuple(cameras)
-    anchors = np.stack([camera.R_cam_head for camera in cameras])
+    prior = load_head_prior()
+    problem = _Problem(views, features, lenses, generic, prior, _rotations(cameras))
+    state = _State(tuple(cameras), vertices)
     scales = _scales(cameras)
     for step, scale in enumerate(scales):
         tell(step, len(scales) + 1)
         for _ in range(COARSE_ROUNDS if step == 0 else 1):
-            mesh = visible_mesh(generic, vertices)
-            tracks = find_tracks(views, cameras, mesh, mm_per_px=scale, places=PLACES)
-            solution = _solve(tracks, cameras, anchors, vertices, features, lenses, generic, prior)
-            turned = max(
-                angle_between(a.R_cam_head, b.R_cam_head)
-                for a, b in zip(cameras, solution.cameras, strict=True)
-            )
-            cameras, vertices = solution.cameras, prior.vertices(solution.coefficients)
-            vertices = _moved(vertices, tracks, cameras, generic)
-            if turned < SETTLED_RAD:
+            before = state.cameras
+            state, tracks, solution = problem.round(state, scale)
+            if _largest_turn(before, state.cameras) < SETTLED_RAD:
                 break
     tell(len(scales), len(scales) + 1)
-    mesh = visible_mesh(generic, vertices)
-    fine = find_tracks(views, cameras, mesh, mm_per_px=FINEST_MM, places=FINE_PLACES)
-    vertices = _moved(vertices, fine, cameras, generic)
+    finest = problem.tracks(state, max(FINEST_MM, finest_mm_per_px(state.cameras)), FINE_PLACES)
+    vertices, offsets = problem.moved(state.vertices, finest, state.cameras)
+    count = len(solution.coefficients)
+    deviation = vertex_deviation(
+        solution.covariance[-count:, -count:], prior, finest, offsets, generic
+    )
     tell(len(scales) + 1, len(scales) + 1)
-    return Registration(cameras, vertices, solution, tracks, fine)
+    quality = judge_registration(tracks, solution, generic)
+    return Registration(state.cameras, vertices, deviation, quality)
+
+
+@dataclass(frozen=True)
+class _State:
+    cameras: tuple[Camera, ...]
+    vertices: Float[Array, "v 3"]
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """What stays the same from round to round."""
+
+    views: Sequence[View]
+    features: Features
+    lenses: Lenses
+    generic: GenericHead
+    prior: HeadPrior
+    anchors: Float[Array, "k 3 3"]
+
+    def round(self, state: _State, scale: float) -> tuple[_State, Tracks, JointSolution]:
+        """Follow places at this scale (mm a px), solve for all, move the surface."""
+        tracks = self.tracks(state, scale, PLACES)
+        solution = self.solve(state, tracks)
+        vertices = self.prior.vertices(solution.coefficients)
+        vertices, _ = self.moved(vertices, tracks, solution.cameras)
+        return _State(solution.cameras, vertices), tracks, solution
+
+    def tracks(self, state: _State, scale: float, places: int) -> Tracks:
+        """Places of the surface that several photos show."""
+        mesh = visible_mesh(self.generic, state.vertices)
+        return find_tracks(self.views, state.cameras, mesh, mm_per_px=scale, places=places)
+
+    def moved(
+        self, vertices: Float[Array, "v 3"], tracks: Tracks, cameras: Sequence[Camera]
+    ) -> tuple[Float[Array, "v 3"], Offsets]:
+        """The surface where the photos put it."""
+        offsets = measure_offsets(tracks, cameras, self.generic.mesh.with_vertices(vertices))
+        return move_surface(vertices, tracks, offsets, self.generic), offsets
+
+    def solve(self, state: _State, tracks: Tracks) -> JointSolution:
+        """Tracks and features together: places on the mesh, what photos show of them, beliefs."""
+        features, prior = self.features, self.prior
+        photo, feature = np.nonzero(features.seen)
+        by_hand = features.by_hand[photo, feature]
+        sigma = features.sigma_px(state.cameras)[photo, feature]
+        crowding = np.sqrt(tracks.crowding)[tracks.place]
+        sightings = Sightings(
+            photo=np.append(tracks.photo, photo),
+            place=np.append(tracks.place, feature + len(tracks.corners)),
+            image_points=np.concatenate(
+                [tracks.image_points, features.image_points[photo, feature]]
+            ),
+            sigma_px=np.append(
+                tracks.sigma_px * crowding, np.where(by_hand, sigma, LANDMARK_SHARE * sigma)
+            ),
+            guides=np.append(np.ones(len(tracks.photo), bool), by_hand),
+        )
+
+        def on(values: Array) -> Array:
+            return np.concatenate([tracks.on(values), features.on(values)], axis=-2)
+
+        attached = np.tile(np.eye(3) / ATTACHED_SD_MM**2, (len(features.names), 1, 1))
+        mesh = self.generic.mesh.with_vertices(state.vertices)
+        beliefs = PlacePrior(
+            on(prior.mean),
+            np.ascontiguousarray(np.swapaxes(on(prior.components), 0, 1)),
+            np.concatenate([_skin_precision(tracks, mesh, self.generic), attached]),
+        )
+        return solve_jointly(
+            state.cameras, on(state.vertices), sightings, beliefs, self.lenses, anchors=self.anchors
+        )
+
+
+def _rotations(cameras: Sequence[Camera]) -> Float[Array, "k 3 3"]:
+    return np.stack([camera.R_cam_head for camera in cameras])
+
+
+def _largest_turn(before: Sequence[Camera], after: Sequence[Camera]) -> float:
+    return float(angle_between(_rotations(before), _rotations(after)).max())
 
 
 def _scales(cameras: Sequence[Camera]) -> list[float]:
@@ -100,62 +187,13 @@ def _scales(cameras: Sequence[Camera]) -> list[float]:
     return [*useful, max(finest, SCALES_MM[-1])] if len(useful) < len(SCALES_MM) else useful
 
 
-def _moved(
-    vertices: Float[Array, "v 3"],
-    tracks: Tracks,
-    cameras: Sequence[Camera],
-    generic: GenericHead,
-) -> Float[Array, "v 3"]:
-    offsets = measure_offsets(tracks, cameras, generic.mesh.with_vertices(vertices))
-    return move_surface(vertices, tracks, offsets, generic)
-
-
-def _solve(
-    tracks: Tracks,
-    cameras: Sequence[Camera],
-    anchors: Float[Array, "k 3 3"],
-    vertices: Float[Array, "v 3"],
-    features: Features,
-    lenses: Lenses,
-    generic: GenericHead,
-    prior: HeadPrior,
-) -> JointSolution:
-    """Tracks and features together: places on the mesh, what photos show of them, beliefs."""
-    photo, feature = np.nonzero(features.seen)
-    sigma = features.sigma_px(cameras)[photo, feature]
-    sigma = np.where(features.by_hand[photo, feature], sigma, LANDMARK_SHARE * sigma)
-    sightings = Sightings(
-        photo=np.append(tracks.photo, photo),
-        place=np.append(tracks.place, feature + len(tracks.corners)),
-        image_points=np.concatenate([tracks.image_points, features.image_points[photo, feature]]),
-        sigma_px=np.append(tracks.sigma_px * np.sqrt(tracks.crowding)[tracks.place], sigma),
-        guides=np.append(np.ones(len(tracks.photo), bool), features.by_hand[photo, feature]),
-    )
-
-    def on(values: Array) -> Array:
-        return np.concatenate([tracks.on(values), features.on(values)], axis=-2)
-
-    precision = np.concatenate(
-        [
-            _track_precision(tracks, vertices, generic),
-            np.tile(np.eye(3) / ATTACHED_SD_MM**2, (len(features.names), 1, 1)),
-        ]
-    )
-    components = np.ascontiguousarray(np.swapaxes(on(prior.components), 0, 1))
-    beliefs = PlacePrior(on(prior.mean), components, precision)
-    return solve_jointly(cameras, on(vertices), sightings, beliefs, lenses, anchors=anchors)
-
-
-def _track_precision(
-    tracks: Tracks, vertices: Float[Array, "v 3"], generic: GenericHead
-) -> Float[Array, "n 3 3"]:
-    mesh = generic.mesh.with_vertices(vertices)
+def _skin_precision(tracks: Tracks, mesh: Mesh, generic: GenericHead) -> Float[Array, "n 3 3"]:
+    """(N, 3, 3) 1 / mm^2: how near the surface's places lie to the prior, by direction."""
     normals = tracks.on(mesh.vertex_normals())
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     across = normals[:, :, None] * normals[:, None, :]
     hair = tracks.on(generic.regions["scalp"][:, None])[:, 0]
     across_sd = ACROSS_SD_MM + hair * (HAIR_SD_MM - ACROSS_SD_MM)
-    precision: Array = (np.eye(3) - across) / ALONG_SD_MM**2 + across / across_sd[
-        :, None, None
-    ] ** 2
-    return precision
+    along: Array = (np.eye(3) - across) / ALONG_SD_MM**2
+    share = min(1.0, INDEPENDENT_PLACES / max(len(normals), 1))
+    return share * (along + across / across_sd[:, None, None] ** 2)

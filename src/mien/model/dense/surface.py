@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mien.arrays import Array, Float
+from mien.arrays import Array, Bool, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.mesh import Mesh
@@ -88,31 +88,47 @@ def move_surface(
     the skin's vertices. Where no photo tells, h goes on smoothly and fades. What is not skin goes
     with the skin near it; eyeballs stay round.
     """
-    stiffness, skin = _stiffness(generic)
-    heights = _solve_heights(stiffness, skin, tracks, offsets)
+    surface = _height_problem(generic)
+    heights = _solve_heights(surface, tracks, offsets)
     mesh = generic.mesh.with_vertices(vertices)
     normals = mesh.submesh(mesh.triangles_of("skin")).vertex_normals()
     moves = heights[:, None] * normals
-    moved = vertices + _carried(moves, vertices, skin)
+    moved = vertices + _carried(moves, vertices, surface.skin)
     return with_round_eyes(moved, vertices, generic)
 
 
-def _solve_heights(
-    stiffness: Any, skin: Array, tracks: Tracks, offsets: Offsets
-) -> Float[Array, " v"]:
-    from scipy.sparse import csr_matrix, diags
+def sample_heights(
+    tracks: Tracks, offsets: Offsets, generic: GenericHead, *, draws: int, seed: int = 0
+) -> Float[Array, "d v"]:
+    """(D, V) mm: draws of what the offsets leave open of the skin's heights.
+
+    Source: perturb and solve (Papandreou and Yuille, 2010): with data and stiffness perturbed by
+    their own noise, the solutions scatter as the posterior does.
+    """
+    from scipy.sparse import diags
     from scipy.sparse.linalg import splu
 
-    count = stiffness.shape[0]
-    places = len(tracks.corners)
-    rows = np.repeat(np.arange(places), 3)
-    on_skin = np.where(skin[tracks.corners], tracks.barycentrics, 0.0)
-    spread = csr_matrix((on_skin.ravel(), (rows, tracks.corners.ravel())), shape=(places, count))
-    used = skin[tracks.corners].all(axis=1)
-    heights, left = np.zeros(count), offsets.along_normal
+    surface = _height_problem(generic)
+    spread, used = surface.at(tracks)
+    weights = used / offsets.sd**2
+    matrix = (spread.T @ diags(weights) @ spread + surface.stiffness).tocsc()
+    rng = np.random.default_rng(seed)
+    count = len(weights)
+    data = spread.T @ (np.sqrt(weights)[:, None] * rng.normal(size=(count, draws)))
+    bending = surface.root.T @ rng.normal(size=(surface.root.shape[0], draws))
+    heights: Array = splu(matrix).solve(np.asarray(data + bending)).T
+    return heights
+
+
+def _solve_heights(surface: _HeightProblem, tracks: Tracks, offsets: Offsets) -> Float[Array, " v"]:
+    from scipy.sparse import diags
+    from scipy.sparse.linalg import splu
+
+    spread, used = surface.at(tracks)
+    heights, left = np.zeros(spread.shape[1]), offsets.along_normal
     for _ in range(_ROUNDS):
         weights = used / (offsets.sd**2 * (1 + (left / (_WRONG_SDS * offsets.sd)) ** 2))
-        matrix = (spread.T @ diags(weights) @ spread + stiffness).tocsc()
+        matrix = (spread.T @ diags(weights) @ spread + surface.stiffness).tocsc()
         heights = splu(matrix).solve(spread.T @ (weights * offsets.along_normal))
         left = offsets.along_normal - spread @ heights
     return heights
@@ -130,25 +146,51 @@ def _carried(
     return result
 
 
-def _stiffness(generic: GenericHead) -> tuple[Any, Array]:
-    """(V, V) sparse: bending of a height field on the skin; (V,) which vertices are skin.
+@dataclass(frozen=True)
+class _HeightProblem:
+    """What does not depend on the photos.
+
+    Attributes:
+        skin: (V,) which vertices are skin; the others have no height.
+        stiffness: (V, V) sparse, root^T root; root: (R, V).
+    """
+
+    skin: Bool[Array, " v"]
+    stiffness: Any
+    root: Any
+
+    def at(self, tracks: Tracks) -> tuple[Any, Bool[Array, " n"]]:
+        """(N, V) sparse: heights of the vertices to heights at the places; which are on skin."""
+        from scipy.sparse import csr_matrix
+
+        count = len(tracks.corners)
+        rows = np.repeat(np.arange(count), 3)
+        spread = csr_matrix(
+            (tracks.barycentrics.ravel(), (rows, tracks.corners.ravel())),
+            shape=(count, len(self.skin)),
+        )
+        used: Array = np.asarray(self.skin[tracks.corners].all(axis=1))
+        return spread, used
+
+
+def _height_problem(generic: GenericHead) -> _HeightProblem:
+    """Bending of a height field on the skin, and a spring that lets it fade far from all data.
 
     Source: the thin plate on a mesh, L^T M^-1 L with cotangent Laplacian L and areas M
     (Botsch and Kobbelt, 2004).
     """
-    from scipy.sparse import csr_matrix, diags
+    from scipy.sparse import csr_matrix, diags, vstack
 
     vertices = generic.mesh.vertices
     triangles = generic.mesh.triangles[generic.mesh.triangles_of("skin")]
-    count = len(vertices)
-    skin = np.zeros(count, bool)
+    skin = np.zeros(len(vertices), bool)
     skin[triangles] = True
     laplacian, areas = _laplacian(vertices, triangles)
-    bending = laplacian.T @ diags(1 / areas) @ laplacian
-    # Far from all data the height fades: a spring that is felt over _REACH_MM.
-    fade = areas * BENDING / _REACH_MM**4
-    fade[~skin] = 1.0
-    return csr_matrix(BENDING * bending + diags(fade)), skin
+    spring = np.where(skin, np.sqrt(BENDING * areas) / _REACH_MM**2, 1.0)
+    root = csr_matrix(
+        vstack([np.sqrt(BENDING) * diags(1 / np.sqrt(areas)) @ laplacian, diags(spring)])
+    )
+    return _HeightProblem(skin, csr_matrix(root.T @ root), root)
 
 
 def _laplacian(vertices: Array, triangles: Array) -> tuple[Any, Array]:

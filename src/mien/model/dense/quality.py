@@ -1,0 +1,100 @@
+"""How far a registration can be trusted, and what to tell the user of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Float, Int
+from mien.assets.generic import GenericHead
+from mien.model.dense.joint import POSE, JointSolution, matching_noise
+from mien.model.dense.tracks import Tracks
+
+FEW_PLACES = 60
+"""A photo that shares fewer with the others is not registered by them."""
+UNSURE_TURN_DEG = 2.0
+_WRONG_SIGMAS = 3.0
+"""An observation this many times the usual error off disagrees with the other photos."""
+_ODD_SHARE, _ODD_RATIO, _ODD_PLACES = 0.25, 3.0, 20
+"""A region of a photo differs when so much of it disagrees, so many times more than in the other
+photos, judged by at least so many places."""
+REGIONS = {"mouth": "the mouth", "eyes": "the eyes", "forehead": "the forehead"}
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What the photos say of each other.
+
+    Attributes:
+        shared: (K,) places that each photo shares with others.
+        disagreeing: (K, R) share of them that disagree, by region of REGIONS; NaN for too few.
+        turn_sd: (K,) radians, of each photo's turn against the first.
+    """
+
+    shared: Int[Array, " k"]
+    disagreeing: Float[Array, "k r"]
+    turn_sd: Float[Array, " k"]
+
+    def notes(self, names: Sequence[str]) -> tuple[str, ...]:
+        """What a user should know, by photo."""
+        lines = [
+            f"{name}: shares too little skin with the other photos ({shared} places) to be "
+            "registered by it; its camera rests on landmarks"
+            for name, shared in zip(names, self.shared, strict=True)
+            if shared < FEW_PLACES
+        ]
+        for k, name in enumerate(names):
+            odd = [text for r, text in enumerate(REGIONS.values()) if self._differs(k, r)]
+            if odd:
+                verb = "differs" if odd == ["the mouth"] or odd == ["the forehead"] else "differ"
+                lines.append(
+                    f"{name}: {' and '.join(odd)} {verb} from the other photos (another "
+                    "expression?); these parts of it count less"
+                )
+        worst = float(np.degrees(self.turn_sd.max()))
+        if worst > UNSURE_TURN_DEG:
+            lines.append(
+                f"the angle between the photos is known to {worst:.0f} degrees only, and with it "
+                "how deep the face is: a photo from a third side would tell"
+            )
+        return tuple(lines)
+
+    def _differs(self, k: int, region: int) -> bool:
+        share, others = self.disagreeing[k, region], np.delete(self.disagreeing[:, region], k)
+        known = others[np.isfinite(others)]
+        if not np.isfinite(share) or len(known) < 2:
+            return False
+        return bool(share > _ODD_SHARE and share > _ODD_RATIO * np.median(known))
+
+
+def judge_registration(tracks: Tracks, solution: JointSolution, generic: GenericHead) -> Quality:
+    """From the last joint solution and the tracks it rests on."""
+    photos = len(solution.cameras)
+    off = solution.off_sigmas[: len(tracks.photo)]
+    wrong = off > _WRONG_SIGMAS * matching_noise(off)
+    masks = np.stack([generic.regions[name] for name in REGIONS], axis=-1)
+    inside = tracks.on(masks)[tracks.place] > 0.5
+    disagreeing = np.full((photos, len(REGIONS)), np.nan)
+    for k in range(photos):
+        for r in range(len(REGIONS)):
+            here = (tracks.photo == k) & inside[:, r]
+            if np.count_nonzero(here) >= _ODD_PLACES:
+                disagreeing[k, r] = wrong[here].mean()
+    return Quality(
+        np.bincount(tracks.photo[~wrong], minlength=photos),
+        disagreeing,
+        _turn_deviations(solution, photos),
+    )
+
+
+def _turn_deviations(solution: JointSolution, photos: int) -> Float[Array, " k"]:
+    deviations = np.zeros(photos)
+    for k in range(1, photos):
+        first, own = slice(0, 3), slice(POSE * k, POSE * k + 3)
+        covariance = solution.covariance
+        both = covariance[first, first] + covariance[own, own]
+        both = both - covariance[first, own] - covariance[own, first]
+        deviations[k] = np.sqrt(max(float(np.trace(both)), 0.0))
+    return deviations
