@@ -13,6 +13,7 @@ from mien.camera import Camera
 from mien.capture.source import View
 from mien.mesh import Mesh
 from mien.model.dense.crops import finest_mm_per_px, visible_mesh
+from mien.model.dense.eyes import seat_eyes
 from mien.model.dense.joint import JointSolution, Lenses, PlacePrior, Sightings, solve_jointly
 from mien.model.dense.prior import HeadPrior, load_head_prior
 from mien.model.dense.quality import Quality, judge_registration
@@ -92,6 +93,7 @@ def register_views(
     tell(len(scales), len(scales) + 1)
     finest = problem.tracks(state, max(FINEST_MM, finest_mm_per_px(state.cameras)), FINE_PLACES)
     vertices, offsets = problem.moved(state.vertices, finest, state.cameras)
+    vertices = seat_eyes(vertices, generic)
     count = len(solution.coefficients)
     deviation = vertex_deviation(
         solution.covariance[-count:, -count:], prior, finest, offsets, generic

@@ -25,6 +25,9 @@ LEAST_SD_MM = 0.05
 _WRONG_SDS = 1.5
 _ROUNDS = 4
 _REACH_MM = 30.0
+_STRAIGHTENED_MM, _LEAST_STRAIGHT = 6.0, 0.3
+"""How far around normals are averaged into directions of movement, and the least cosine between the
+two that counts."""
 _FAR_MM = 10.0
 """A place may lie this far off the surface along the rays."""
 
@@ -82,18 +85,20 @@ def measure_offsets(
 def move_surface(
     vertices: Float[Array, "v 3"], tracks: Tracks, offsets: Offsets, generic: GenericHead
 ) -> Float[Array, "v 3"]:
-    """The head moved along its normals to where the photos put it, smoothly.
+    """The head moved to where the photos put it, smoothly.
 
-    Minimizes sum_n rho((b_n . h - offset_n) / sd_n) + BENDING * bending(h) over the offsets h of
-    the skin's vertices. Where no photo tells, h goes on smoothly and fades. What is not skin goes
-    with the skin near it; eyeballs stay round.
+    Minimizes sum_n rho((b_n . h - offset_n) / sd_n) + BENDING * bending(h) over the heights h of
+    the outer skin's vertices. Where no photo tells, h goes on smoothly and fades. A height is
+    along the normal, averaged so far around that the two lips, or the two lids, move the same way
+    and do not part. What lies inside (mouth, eye sockets) goes with the skin near it; eyeballs
+    stay round.
     """
     surface = _height_problem(generic)
-    heights = _solve_heights(surface, tracks, offsets)
     mesh = generic.mesh.with_vertices(vertices)
-    normals = mesh.submesh(mesh.triangles_of("skin")).vertex_normals()
-    moves = heights[:, None] * normals
-    moved = vertices + _carried(moves, vertices, surface.skin)
+    directions = _directions(mesh, surface.outer)
+    heights = _solve_heights(surface, tracks, offsets, mesh, directions)
+    moves = heights[:, None] * directions
+    moved = vertices + _carried(moves, vertices, surface.outer)
     return with_round_eyes(moved, vertices, generic)
 
 
@@ -120,11 +125,21 @@ def sample_heights(
     return heights
 
 
-def _solve_heights(surface: _HeightProblem, tracks: Tracks, offsets: Offsets) -> Float[Array, " v"]:
+def _solve_heights(
+    surface: _HeightProblem,
+    tracks: Tracks,
+    offsets: Offsets,
+    mesh: Mesh,
+    directions: Float[Array, "v 3"],
+) -> Float[Array, " v"]:
     from scipy.sparse import diags
     from scipy.sparse.linalg import splu
 
     spread, used = surface.at(tracks)
+    # Offsets are along the normals, heights along smoother directions.
+    normals = mesh.vertex_normals()
+    straightness = (tracks.on(normals) * tracks.on(directions)).sum(axis=1)
+    spread = diags(np.maximum(straightness, _LEAST_STRAIGHT)) @ spread
     heights, left = np.zeros(spread.shape[1]), offsets.along_normal
     for _ in range(_ROUNDS):
         weights = used / (offsets.sd**2 * (1 + (left / (_WRONG_SDS * offsets.sd)) ** 2))
@@ -135,15 +150,28 @@ def _solve_heights(surface: _HeightProblem, tracks: Tracks, offsets: Offsets) ->
 
 
 def _carried(
-    moves: Float[Array, "v 3"], vertices: Float[Array, "v 3"], skin: Array
+    moves: Float[Array, "v 3"], vertices: Float[Array, "v 3"], outer: Bool[Array, " v"]
 ) -> Float[Array, "v 3"]:
-    """Vertices that are not skin go with the skin around them."""
-    distance, nearest = cKDTree(vertices[skin]).query(vertices[~skin], k=24)
+    """Vertices that are not outer skin go with the outer skin around them."""
+    distance, nearest = cKDTree(vertices[outer]).query(vertices[~outer], k=24)
     weights = np.exp(-((distance / (distance[:, :1] + 5.0)) ** 2))
     result = moves.copy()
-    near = moves[skin][nearest]
-    result[~skin] = (weights[..., None] * near).sum(axis=1) / weights.sum(axis=1)[:, None]
+    near = moves[outer][nearest]
+    result[~outer] = (weights[..., None] * near).sum(axis=1) / weights.sum(axis=1)[:, None]
     return result
+
+
+def _directions(mesh: Mesh, outer: Bool[Array, " v"]) -> Float[Array, "v 3"]:
+    """(V, 3) unit: the outer skin's normals, averaged over their surroundings."""
+    used = outer[mesh.triangles].all(axis=1)
+    normals = mesh.submesh(np.flatnonzero(used)).vertex_normals()
+    distance, nearest = cKDTree(mesh.vertices[outer]).query(mesh.vertices[outer], k=48)
+    weights = np.exp(-((distance / _STRAIGHTENED_MM) ** 2))
+    averaged = (weights[..., None] * normals[outer][nearest]).sum(axis=1)
+    directions = np.zeros_like(normals)
+    length = np.linalg.norm(averaged, axis=1, keepdims=True)
+    directions[outer] = averaged / np.maximum(length, 1e-9)
+    return directions
 
 
 @dataclass(frozen=True)
@@ -151,25 +179,25 @@ class _HeightProblem:
     """What does not depend on the photos.
 
     Attributes:
-        skin: (V,) which vertices are skin; the others have no height.
+        outer: (V,) which vertices are skin that shows; the others have no height.
         stiffness: (V, V) sparse, root^T root; root: (R, V).
     """
 
-    skin: Bool[Array, " v"]
+    outer: Bool[Array, " v"]
     stiffness: Any
     root: Any
 
     def at(self, tracks: Tracks) -> tuple[Any, Bool[Array, " n"]]:
-        """(N, V) sparse: heights of the vertices to heights at the places; which are on skin."""
+        """(N, V) sparse: heights of the vertices to heights at the places; which have one."""
         from scipy.sparse import csr_matrix
 
         count = len(tracks.corners)
         rows = np.repeat(np.arange(count), 3)
         spread = csr_matrix(
             (tracks.barycentrics.ravel(), (rows, tracks.corners.ravel())),
-            shape=(count, len(self.skin)),
+            shape=(count, len(self.outer)),
         )
-        used: Array = np.asarray(self.skin[tracks.corners].all(axis=1))
+        used: Array = np.asarray(self.outer[tracks.corners].all(axis=1))
         return spread, used
 
 
@@ -182,15 +210,17 @@ def _height_problem(generic: GenericHead) -> _HeightProblem:
     from scipy.sparse import csr_matrix, diags, vstack
 
     vertices = generic.mesh.vertices
-    triangles = generic.mesh.triangles[generic.mesh.triangles_of("skin")]
-    skin = np.zeros(len(vertices), bool)
-    skin[triangles] = True
+    skin = generic.mesh.triangles[generic.mesh.triangles_of("skin")]
+    inner = np.maximum(generic.regions["mouth_cavity"], generic.regions["eye_socket"]) > 0.5
+    triangles = skin[~inner[skin].any(axis=1)]
+    outer = np.zeros(len(vertices), bool)
+    outer[triangles] = True
     laplacian, areas = _laplacian(vertices, triangles)
-    spring = np.where(skin, np.sqrt(BENDING * areas) / _REACH_MM**2, 1.0)
+    spring = np.where(outer, np.sqrt(BENDING * areas) / _REACH_MM**2, 1.0)
     root = csr_matrix(
         vstack([np.sqrt(BENDING) * diags(1 / np.sqrt(areas)) @ laplacian, diags(spring)])
     )
-    return _HeightProblem(skin, csr_matrix(root.T @ root), root)
+    return _HeightProblem(outer, csr_matrix(root.T @ root), root)
 
 
 def _laplacian(vertices: Array, triangles: Array) -> tuple[Any, Array]:
