@@ -15,7 +15,7 @@ from mien.errors import EstimationError
 from mien.model.adjust import Adjustment, FocalPrior, ShapePrior, adjust_bundle
 from mien.model.deform import eye_centers, vertex_uncertainty
 from mien.model.dense.joint import Lenses
-from mien.model.dense.register import register_views
+from mien.model.dense.register import deviation_by_features, register_views
 from mien.model.features import (
     Features,
     gather_features,
@@ -116,7 +116,7 @@ def _fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions)
         worst, why = misfit
         left_out[solution.views[worst].photo.name] = why
         views = [view for k, view in enumerate(solution.views) if k != worst]
-    if options.dense and options.adjust and len(solution.views) > 1:
+    if options.dense and options.adjust:
         solution = _registered(solution, generic)
     vertices, cameras = _in_head_space(solution, generic, options)
     sigma_px = solution.features.sigma_px(solution.cameras)
@@ -130,18 +130,11 @@ def _fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions)
 
 def _registered(solution: _Solution, generic: GenericHead) -> _Solution:
     """The same photos registered with each other by all the skin that they share."""
-    views = solution.views
-    focal = _focal_prior(views)
-    group = np.unique(_lenses(views), return_inverse=True)[1].reshape(-1)
-    count = np.bincount(group)
-    lenses = Lenses(
-        group,
-        np.bincount(group, np.log(focal.focal_px)) / count,
-        np.bincount(group, focal.deviation) / count,
-    )
-    registration = register_views(
-        views, solution.cameras, solution.vertices, solution.features, lenses, generic
-    )
+    views, lenses = solution.views, _lens_beliefs(solution.views)
+    known = (views, solution.cameras, solution.vertices, solution.features, lenses, generic)
+    if len(views) == 1:
+        return replace(solution, uncertainty_mm=deviation_by_features(*known))
+    registration = register_views(*known)
     names = [view.photo.name for view in views]
     return replace(
         solution,
@@ -150,6 +143,17 @@ def _registered(solution: _Solution, generic: GenericHead) -> _Solution:
         residuals=_residuals(solution.features, registration.cameras, registration.vertices),
         uncertainty_mm=registration.deviation_mm,
         notes=registration.quality.notes(names),
+    )
+
+
+def _lens_beliefs(views: Sequence[View]) -> Lenses:
+    focal = _focal_prior(views)
+    group = np.unique(_lenses(views), return_inverse=True)[1].reshape(-1)
+    count = np.bincount(group)
+    return Lenses(
+        group,
+        np.bincount(group, np.log(focal.focal_px)) / count,
+        np.bincount(group, focal.deviation) / count,
     )
 
 

@@ -17,8 +17,8 @@ from mien.model.dense.eyes import seat_eyes
 from mien.model.dense.joint import JointSolution, Lenses, PlacePrior, Sightings, solve_jointly
 from mien.model.dense.prior import HeadPrior, load_head_prior
 from mien.model.dense.quality import Quality, judge_registration
-from mien.model.dense.surface import Offsets, measure_offsets, move_surface
-from mien.model.dense.tracks import Tracks, find_tracks
+from mien.model.dense.surface import NO_OFFSETS, Offsets, measure_offsets, move_surface
+from mien.model.dense.tracks import NO_TRACKS, Tracks, find_tracks
 from mien.model.dense.uncertainty import vertex_deviation
 from mien.model.features import Features
 from mien.numeric.rotation import angle_between
@@ -103,6 +103,23 @@ def register_views(
     return Registration(state.cameras, vertices, deviation, quality)
 
 
+def deviation_by_features(
+    views: Sequence[View],
+    cameras: Sequence[Camera],
+    vertices: Float[Array, "v 3"],
+    features: Features,
+    lenses: Lenses,
+    generic: GenericHead,
+) -> Float[Array, " v"]:
+    """(V,) mm: standard deviation of a head that landmarks and marks alone tell (one photo)."""
+    prior = load_head_prior()
+    problem = _Problem(views, features, lenses, generic, prior, _rotations(cameras))
+    solution = problem.solve(_State(tuple(cameras), vertices), NO_TRACKS)
+    count = len(solution.coefficients)
+    covariance = solution.covariance[-count:, -count:]
+    return vertex_deviation(covariance, prior, NO_TRACKS, NO_OFFSETS, generic)
+
+
 @dataclass(frozen=True)
 class _State:
     cameras: tuple[Camera, ...]
@@ -146,6 +163,9 @@ class _Problem:
         photo, feature = np.nonzero(features.seen)
         by_hand = features.by_hand[photo, feature]
         sigma = features.sigma_px(state.cameras)[photo, feature]
+        # Landmarks lead the cameras only where nothing better does.
+        leading = by_hand | (len(tracks.photo) == 0)
+        sigma = np.where(leading, sigma, LANDMARK_SHARE * sigma)
         crowding = np.sqrt(tracks.crowding)[tracks.place]
         sightings = Sightings(
             photo=np.append(tracks.photo, photo),
@@ -153,10 +173,8 @@ class _Problem:
             image_points=np.concatenate(
                 [tracks.image_points, features.image_points[photo, feature]]
             ),
-            sigma_px=np.append(
-                tracks.sigma_px * crowding, np.where(by_hand, sigma, LANDMARK_SHARE * sigma)
-            ),
-            guides=np.append(np.ones(len(tracks.photo), bool), by_hand),
+            sigma_px=np.append(tracks.sigma_px * crowding, sigma),
+            guides=np.append(np.ones(len(tracks.photo), bool), leading),
         )
 
         def on(values: Array) -> Array:

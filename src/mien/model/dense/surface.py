@@ -44,6 +44,9 @@ class Offsets:
     sd: Float[Array, " n"]
 
 
+NO_OFFSETS = Offsets(np.zeros(0), np.zeros(0))
+
+
 def measure_offsets(
     tracks: Tracks, cameras: Sequence[Camera], mesh: Mesh, *, rounds: int = 4
 ) -> Offsets:

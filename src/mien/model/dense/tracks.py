@@ -103,7 +103,7 @@ def find_tracks(
         one.add(b, check_match(there, back), other.view.crop)
         other.add(a, check_match(back, there), one.view.crop)
     parts = [seen.tracks(mesh, round(share)) for seen in gathered if seen and seen.photos]
-    return _joined(parts) if parts else _NOTHING
+    return _joined(parts) if parts else NO_TRACKS
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ def _thinned(found: Bool[Array, " g"], most: int) -> Bool[Array, " g"]:
     return kept
 
 
-_NOTHING = Tracks(
+NO_TRACKS = Tracks(
     corners=np.zeros((0, 3), np.int64),
     barycentrics=np.zeros((0, 3)),
     reference=np.zeros(0, np.int64),
