@@ -141,7 +141,7 @@ def _expression(name: str, fit: Fit) -> Expression:
             photo=photo,
             camera=item.camera,
             rms_px=item.rms_px,
-            points_used=len(item.trusted),
+            points_used=item.points_used,
             distrusted={mark.name: mark.verdict for mark in item.marks if mark.verdict},
         )
         for photo, item in fit.photos.items()

@@ -123,7 +123,8 @@ def _fit_views(views: Sequence[View], generic: GenericHead, options: FitOptions)
     photos = {}
     for k, (view, camera) in enumerate(zip(solution.views, cameras, strict=True)):
         marks = judge_marks(solution.features, k, solution.residuals[k], sigma_px[k])
-        photos[view.photo.name] = PhotoFit(camera, marks)
+        matches, rms_px = solution.matches[k] if solution.matches else (0, 0.0)
+        photos[view.photo.name] = PhotoFit(camera, marks, matches, rms_px)
     notes = (*depth_notes(cameras), *solution.notes, *name_notes(photos))
     return Fit(vertices, photos, left_out, solution.uncertainty_mm, notes)
 
@@ -135,14 +136,15 @@ def _registered(solution: _Solution, generic: GenericHead) -> _Solution:
     if len(views) == 1:
         return replace(solution, uncertainty_mm=deviation_by_features(*known))
     registration = register_views(*known)
-    names = [view.photo.name for view in views]
+    names, quality = [view.photo.name for view in views], registration.quality
     return replace(
         solution,
         cameras=registration.cameras,
         vertices=registration.vertices,
         residuals=_residuals(solution.features, registration.cameras, registration.vertices),
         uncertainty_mm=registration.deviation_mm,
-        notes=registration.quality.notes(names),
+        notes=quality.notes(names),
+        matches=tuple(zip(quality.shared.tolist(), quality.rms_px.tolist(), strict=True)),
     )
 
 
@@ -194,6 +196,7 @@ class _Solution:
     uncertainty_mm: Float[Array, " v"]
     problems: dict[str, str]
     notes: tuple[str, ...] = ()
+    matches: tuple[tuple[int, float], ...] = ()
 
     @property
     def typical_misfits(self) -> Float[Array, " k"]:

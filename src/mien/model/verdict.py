@@ -41,10 +41,18 @@ class Mark:
 
 @dataclass(frozen=True)
 class PhotoFit:
-    """The camera of one photo and how well its marks agree with the fitted head."""
+    """The camera of one photo and how well what it shows agrees with the fitted head.
+
+    Attributes:
+        marks: hand-made marks and landmarks.
+        matches: places of the skin that the other photos show, too; they outweigh landmarks.
+        matches_rms_px: root mean square of their residuals.
+    """
 
     camera: Camera
     marks: tuple[Mark, ...]
+    matches: int = 0
+    matches_rms_px: float = 0.0
 
     @property
     def trusted(self) -> tuple[Mark, ...]:
@@ -52,10 +60,21 @@ class PhotoFit:
         return tuple(mark for mark in self.marks if not mark.verdict)
 
     @property
+    def points_used(self) -> int:
+        """How many points the camera and the shape rest on."""
+        return self.matches + len(self._leading)
+
+    @property
+    def _leading(self) -> tuple[Mark, ...]:
+        """Trusted marks that count beside the matches: where there are any, those made by hand."""
+        return tuple(mark for mark in self.trusted if mark.by_hand or not self.matches)
+
+    @property
     def rms_px(self) -> float:
-        """Root mean square distance over the trusted marks."""
-        squares = [mark.distance_px**2 for mark in self.trusted]
-        return float(np.sqrt(np.mean(squares))) if squares else 0.0
+        """Root mean square distance over the points used."""
+        total = self.matches * self.matches_rms_px**2
+        total += sum(mark.distance_px**2 for mark in self._leading)
+        return float(np.sqrt(total / self.points_used)) if self.points_used else 0.0
 
 
 def judge_marks(

@@ -14,7 +14,13 @@ from mien.model.deform import eye_centers
 from mien.model.fit import Fit
 from mien.model.head import Head
 from mien.model.verdict import Mark, PhotoFit
-from mien.report.pictures import coverage_pictures, overlay_picture, preview_pictures
+from mien.report.pictures import (
+    UNCERTAINTY_LIMITS_MM,
+    coverage_pictures,
+    overlay_picture,
+    preview_pictures,
+    uncertainty_pictures,
+)
 
 
 @dataclass(frozen=True)
@@ -52,6 +58,8 @@ def render_report(data: ReportInput) -> str:
         notes=data.notes,
         previews=preview_pictures(data.head),
         coverage=coverage_pictures(data.head, data.coverage),
+        uncertainty=uncertainty_pictures(data.head),
+        uncertainty_limits_mm=UNCERTAINTY_LIMITS_MM,
         photos=[
             _photo(data.head, name, fit.vertices, photo, data.photos[name])
             for fit in data.fits.values()
@@ -78,7 +86,7 @@ def _photo(
         "pitch": pitch,
         "roll": roll,
         "distance_mm": float(np.linalg.norm(fit.camera.center)),
-        "points_used": len(fit.trusted),
+        "points_used": fit.points_used,
         "rms_px": fit.rms_px,
         "overlay": overlay_picture(head.mesh.with_vertices(vertices), fit, pixels),
         "residuals": [_residual(mark) for mark in fit.marks],

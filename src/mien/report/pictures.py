@@ -16,6 +16,10 @@ from mien.render.overlay import overlay_mesh
 from mien.render.shade import render
 
 PREVIEWS = {"front": 0, "left": 45, "left side": 90, "back": 180, "right side": -90, "right": -45}
+_SIDES = ("front", "left side", "back", "right side")
+UNCERTAINTY_LIMITS_MM = (1.0, 10.0)
+"""What the brightest and the darkest colour of the uncertainty stand for."""
+_DARK, _BRIGHT = np.array([60.0, 30.0, 80.0]), np.array([250.0, 220.0, 60.0])
 _SIZE = (360, 450)
 _BACKGROUND = (72, 74, 84)
 _PHOTO_HEIGHT = 900
@@ -32,10 +36,17 @@ def preview_pictures(head: Head) -> list[Picture]:
 def coverage_pictures(head: Head, coverage: Float[Array, "h w"]) -> list[Picture]:
     """The head coloured by what the photos show: dark where none does, bright where squarely."""
     share = np.clip(coverage / max(float(np.quantile(coverage, 0.99)), 1e-6), 0, 1)[..., None]
-    dark, bright = np.array([60, 30, 80]), np.array([250, 220, 60])
-    colours = np.rint(dark + share * (bright - dark)).astype(np.uint8)
-    names = ("front", "left side", "back", "right side")
-    return [_seen_from(head.mesh, colours, name) for name in names]
+    colours = np.rint(_DARK + share * (_BRIGHT - _DARK)).astype(np.uint8)
+    return [_seen_from(head.mesh, colours, name) for name in _SIDES]
+
+
+def uncertainty_pictures(head: Head) -> list[Picture]:
+    """The head coloured by how far it may lie from the truth: bright where it is known well."""
+    low, high = UNCERTAINTY_LIMITS_MM
+    # Logarithmic: from half to one millimetre matters as much as from five to ten.
+    share = np.log(np.clip(head.uncertainty_mm, low, high) / low) / np.log(high / low)
+    colours = _BRIGHT + share[:, None] * (_DARK - _BRIGHT)
+    return [_seen_from(head.mesh, None, name, vertex_colours=colours) for name in _SIDES]
 
 
 def overlay_picture(mesh: Mesh, fit: PhotoFit, pixels: UInt8[Array, "h w 3"]) -> str:
@@ -57,11 +68,24 @@ def overlay_picture(mesh: Mesh, fit: PhotoFit, pixels: UInt8[Array, "h w 3"]) ->
     return _data_uri(image)
 
 
-def _seen_from(mesh: Mesh, texture: UInt8[Array, "h w 3"], name: str) -> Picture:
+def _seen_from(
+    mesh: Mesh,
+    texture: UInt8[Array, "h w 3"] | None,
+    name: str,
+    *,
+    vertex_colours: Float[Array, "v 3"] | None = None,
+) -> Picture:
     camera = orbit_camera(
         np.radians(PREVIEWS[name]), width=_SIZE[0], height=_SIZE[1], vertices=mesh.vertices
     )
-    image = render(mesh, camera, texture, samples=4, background=_BACKGROUND)
+    image = render(
+        mesh,
+        camera,
+        texture,
+        vertex_colours=vertex_colours,
+        samples=4,
+        background=_BACKGROUND,
+    )
     return {"source": _data_uri(image[..., :3]), "caption": name}
 
 

@@ -31,11 +31,13 @@ class Quality:
         shared: (K,) places that each photo shares with others.
         disagreeing: (K, R) share of them that disagree, by region of REGIONS; NaN for too few.
         turn_sd: (K,) radians, of each photo's turn against the first.
+        rms_px: (K,) of the residuals of the places that agree.
     """
 
     shared: Int[Array, " k"]
     disagreeing: Float[Array, "k r"]
     turn_sd: Float[Array, " k"]
+    rms_px: Float[Array, " k"]
 
     def notes(self, names: Sequence[str]) -> tuple[str, ...]:
         """What a user should know, by photo."""
@@ -82,11 +84,12 @@ def judge_registration(tracks: Tracks, solution: JointSolution, generic: Generic
             here = (tracks.photo == k) & inside[:, r]
             if np.count_nonzero(here) >= _ODD_PLACES:
                 disagreeing[k, r] = wrong[here].mean()
-    return Quality(
-        np.bincount(tracks.photo[~wrong], minlength=photos),
-        disagreeing,
-        _turn_deviations(solution, photos),
-    )
+    agreeing = tracks.photo[~wrong]
+    shared = np.bincount(agreeing, minlength=photos)
+    sigma_px = tracks.sigma_px * np.sqrt(tracks.crowding)[tracks.place]
+    squares = (off * sigma_px)[~wrong] ** 2
+    mean = np.bincount(agreeing, squares, minlength=photos) / np.maximum(shared, 1)
+    return Quality(shared, disagreeing, _turn_deviations(solution, photos), np.sqrt(mean))
 
 
 def _turn_deviations(solution: JointSolution, photos: int) -> Float[Array, " k"]:
