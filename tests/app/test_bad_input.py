@@ -77,7 +77,8 @@ def test_photos_of_no_use_beside_good_ones(
     save(bare_james / "wall.png", wall)
     shutil.copy(bare_james / "left.png", bare_james / "left_again.png")
     summary = mien("build", bare_james, "-o", tmp_path / "head", *SMALL).json
-    assert any(note.startswith("wall.png: left out: no face found") for note in summary["notes"])
+    assert "wall.png" in summary["left_out"]
+    assert any(note.startswith("wall.png was left out: ") for note in summary["notes"])
     assert "left_again.png: left out: the same photo as left.png" in summary["notes"]
     photos = [item["photo"] for item in summary["expressions"]["neutral"]]
     assert photos == ["left.png", "right.png"]

@@ -10,7 +10,8 @@ from PIL import Image
 import mien.assets
 from mien.arrays import Array
 from mien.capture.annotations import AnnotationNames
-from mien.capture.source import load_capture
+from mien.capture.detector import NO_FACE
+from mien.capture.source import TO_BE_PLACED, load_capture
 from mien.errors import EstimationError, FileFormatError, InputError
 
 JAMES = Path(mien.assets.__file__).parent / "data" / "james"
@@ -95,14 +96,55 @@ def test_the_same_photo_twice(tmp_path: Path, faces: dict[str, Array]) -> None:
     )
 
 
-def test_photo_without_a_face_is_left_out(
+def test_photo_without_a_face_stays_beside_others(
     tmp_path: Path, faces: dict[str, Array], wall: Array
 ) -> None:
+    put(tmp_path / "a.png", wall)
+    put(tmp_path / "b.png", faces["left"])
+    capture = load_capture(tmp_path)
+    assert [view.photo.name for view in capture.views] == ["a.png", "b.png"]
+    assert [view.marked for view in capture.views] == [False, True]
+    assert capture.notes == (f"a.png: {TO_BE_PLACED}",)
+
+
+def test_photo_without_a_face_stays_beside_annotations(tmp_path: Path, wall: Array) -> None:
+    put(tmp_path / "a.png", wall)
+    put(tmp_path / "b.png", wall[::-1])
+    annotate(tmp_path / "b.png", [10, 20])
+    capture = load_capture(tmp_path, names=NAMES)
+    assert [view.marked for view in capture.views] == [False, True]
+
+
+def test_photo_without_a_face_is_left_out_of_an_expression_without_faces(
+    tmp_path: Path, faces: dict[str, Array], wall: Array
+) -> None:
+    put(tmp_path / "neutral" / "a.png", faces["left"])
+    put(tmp_path / "joy" / "b.png", wall)
+    capture = load_capture(tmp_path)
+    assert list(capture.expressions) == ["neutral"]
+    assert capture.notes == (f"b.png: left out: {NO_FACE}",)
+
+
+def test_the_same_photo_without_a_face_twice(
+    tmp_path: Path, faces: dict[str, Array], wall: Array
+) -> None:
+    for name, pixels in (("a", faces["left"]), ("b", wall), ("c", wall)):
+        put(tmp_path / f"{name}.png", pixels)
+    capture = load_capture(tmp_path)
+    assert [view.photo.name for view in capture.views] == ["a.png", "b.png"]
+    assert capture.notes[0] == "c.png: left out: the same photo as b.png"
+
+
+def test_face_too_small_is_left_out(tmp_path: Path, faces: dict[str, Array]) -> None:
+    """A head of so few pixels cannot be placed by the others either."""
+    tiny = np.full((400, 300, 3), 128, np.uint8)
+    small = np.asarray(Image.fromarray(faces["left"]).resize((48, 64)))
+    tiny[100:164, 100:148] = small
     put(tmp_path / "a.png", faces["left"])
-    put(tmp_path / "b.png", wall)
+    put(tmp_path / "b.png", tiny)
     capture = load_capture(tmp_path)
     assert [view.photo.name for view in capture.views] == ["a.png"]
-    assert capture.notes[0].startswith("b.png: left out: no face found")
+    assert capture.notes[0].startswith("b.png: left out: the face is too small")
 
 
 def test_annotations_stand_in_for_the_detector(tmp_path: Path, wall: Array) -> None:

@@ -21,11 +21,20 @@ MIN_EYE_DISTANCE_PX = 20.0
 GOOD_EYE_DISTANCE_PX = 60.0
 """From here on they are good to 1 % of it; more pixels add little."""
 
+NO_FACE = (
+    "no face found; one must look within about 50 degrees of the camera and fill a twentieth of "
+    "the photo's width"
+)
+
 _SEARCH_SIDE = 1280
 _CROP_WIDTHS = 1.5
 _CROP_SIDE = 768
 _STEADY = 0.02
 _QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+class NoFaceError(EstimationError):
+    """A photo in which no face is found: there is none, or it looks past the detector's reach."""
 
 
 class LandmarkDetector:
@@ -65,16 +74,13 @@ class LandmarkDetector:
             face: which one, counted from 1 from left to right in the photo.
         Raises:
             InputError: `face` is not positive, or there are fewer faces.
-            EstimationError: no face, or one too small.
+            NoFaceError: no face. EstimationError: one too small.
         """
         if face is not None and face < 1:
             raise InputError("face", "a number from 1 on", face)
         sight = self._best_sight(photo, face)
         if sight is None:
-            raise EstimationError(
-                f"{photo.name}: no face found; one must look within about 50 degrees of the camera"
-                " and fill a twentieth of the photo's width"
-            )
+            raise NoFaceError(f"{photo.name}: {NO_FACE}")
         return _landmarks(photo.name, sight)
 
     def detect_fast(self, pixels: UInt8[Array, "h w 3"]) -> DetectedFace | None:

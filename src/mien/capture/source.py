@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mien.capture.annotations import AnnotationNames, Annotations, load_annotations
-from mien.capture.detector import LandmarkDetector
+from mien.capture.detector import NO_FACE, LandmarkDetector, NoFaceError
 from mien.capture.duplicates import same_photo
 from mien.capture.folder import (
     ANNOTATIONS,
@@ -28,6 +28,9 @@ from mien.errors import EstimationError
 Progress = Callable[[int, int], None]
 """Called with the number of steps done and their total."""
 
+TO_BE_PLACED = "no face found; the other photos tell where it was taken from, if they can"
+"""Noted of a photo that shows a profile, perhaps, or nobody."""
+
 _ONE_VIEWPOINT = 10.0
 
 
@@ -44,6 +47,11 @@ class View:
     photo: Photo
     landmarks: Landmarks | None
     annotations: Annotations | None
+
+    @property
+    def marked(self) -> bool:
+        """Whether it is known of any point where the photo shows it."""
+        return self.landmarks is not None or self.annotations is not None
 
 
 @dataclass(frozen=True)
@@ -78,7 +86,9 @@ def load_capture(
 ) -> Capture:
     """Photos from a folder, expression folders, one photo or a video, with all that is known.
 
-    A photo without a usable face and without annotations is left out, and a note says so.
+    A photo in which no face is found stays if others of its expression show one, for they may tell
+    where it was taken from. Any other photo without a usable face and without annotations is left
+    out. Notes tell of both.
 
     Args:
         source: a folder of photos, a folder of one folder an expression, a photo or a video.
@@ -141,7 +151,7 @@ class _Reader:
                 if self.progress is not None:
                     self.progress(done, total)
             self.notes += orphaned_annotations(paths)
-            expressions[expression] = tuple(views)
+            expressions[expression] = self._settled(views)
         return expressions
 
     def from_video(self, source: Path, count: int) -> dict[str, tuple[View, ...]]:
@@ -157,23 +167,25 @@ class _Reader:
         views: list[View] = []
         for photo in photos:
             self._add(views, photo, None)
-        return {NEUTRAL: tuple(views)}
+        return {NEUTRAL: self._settled(views)}
 
     def _add(self, views: list[View], photo: Photo, annotations: Annotations | None) -> None:
-        """The photo as another view, unless it shows no face or is there already."""
+        """The photo as another view, unless its face is of no use or it is there already."""
         notes = list(photo.notes)
-        landmarks = None
+        landmarks, usable = None, True
         try:
             landmarks = self.detector.detect(photo, face=self.face)
             notes += landmarks.notes
         except EstimationError as error:
+            usable = annotations is not None or isinstance(error, NoFaceError)
             reason = str(error).removeprefix(f"{photo.name}: ")
-            notes.append(
-                f"left out: {reason}" if annotations is None else f"{reason}; annotations only"
-            )
+            if annotations is not None:
+                notes.append(f"{reason}; annotations only")
+            elif not usable:
+                notes.append(f"left out: {reason}")
         if annotations is not None:
             notes += annotations.notes
-        if landmarks is not None or annotations is not None:
+        if usable:
             view = View(photo, landmarks, annotations)
             twin = next((other for other in views if same_photo(view, other)), None)
             if twin is None or annotations is not None:
@@ -181,6 +193,13 @@ class _Reader:
             else:
                 notes.append(f"left out: the same photo as {twin.photo.name}")
         self.notes += [f"{photo.name}: {note}" for note in notes]
+
+    def _settled(self, views: list[View]) -> tuple[View, ...]:
+        """Photos without a face stay if any other photo of the expression has one."""
+        anchored = any(view.marked for view in views)
+        what = TO_BE_PLACED if anchored else f"left out: {NO_FACE}"
+        self.notes += [f"{view.photo.name}: {what}" for view in views if not view.marked]
+        return tuple(views) if anchored else ()
 
     def _annotations_of(self, path: Path, photo: Photo) -> Annotations | None:
         file = path.parent / ANNOTATIONS / f"{path.stem}.json"
