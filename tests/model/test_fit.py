@@ -53,13 +53,13 @@ def off_mm(vertices: np.ndarray) -> np.ndarray:
 
 
 MARKS = [*GENERIC.points, *(f"{name}.3" for name in GENERIC.polylines)]
-QUICK = FitOptions(rounds=1)
+QUICK = FitOptions(rounds=1, dense=False)
 
 
 @cache
 def exact_fit(*, adjust: bool = True) -> Fit:
     """Every feature marked exactly in five photos."""
-    return fit_views(views_of(FIVE), GENERIC, FitOptions(adjust=adjust))
+    return fit_views(views_of(FIVE), GENERIC, FitOptions(adjust=adjust, dense=False))
 
 
 @cache

@@ -43,6 +43,8 @@ LANDMARK_SHARE = 4.0
 """Landmarks err together, not each by itself: so many times their sigma."""
 SETTLED_RAD = np.deg2rad(1.0)
 COARSE_ROUNDS = 4
+ENOUGH_PLACES = 150
+"""Fewer places shared by all photos together tell nothing."""
 
 
 @dataclass(frozen=True)
@@ -69,25 +71,30 @@ def register_views(
     lenses: Lenses,
     generic: GenericHead,
     *,
+    scales: Sequence[float] = SCALES_MM,
     progress: Callable[[int, int], None] | None = None,
-) -> Registration:
+) -> Registration | None:
     """Cameras and shape from all the skin that the photos share, from coarse to fine.
 
     Args:
         cameras, vertices: from landmarks, within some 15 degrees.
         features: landmarks and marks of the same photos; landmarks tell which place of the mesh
             is which, marks the cameras as well.
+        scales: mm a px, from round to round.
+    Returns: None where the photos share too little that looks alike.
     """
     tell = progress or (lambda done, total: None)
     prior = load_head_prior()
     problem = _Problem(views, features, lenses, generic, prior, _rotations(cameras))
     state = _State(tuple(cameras), vertices)
-    scales = _scales(cameras)
+    scales = _useful(scales, cameras)
     for step, scale in enumerate(scales):
         tell(step, len(scales) + 1)
         for _ in range(COARSE_ROUNDS if step == 0 else 1):
-            before = state.cameras
-            state, tracks, solution = problem.round(state, scale)
+            before, tracks = state.cameras, problem.tracks(state, scale, PLACES)
+            if len(tracks.corners) < ENOUGH_PLACES:
+                return None
+            state, solution = problem.round(state, tracks)
             if _largest_turn(before, state.cameras) < SETTLED_RAD:
                 break
     tell(len(scales), len(scales) + 1)
@@ -137,13 +144,12 @@ class _Problem:
     prior: HeadPrior
     anchors: Float[Array, "k 3 3"]
 
-    def round(self, state: _State, scale: float) -> tuple[_State, Tracks, JointSolution]:
-        """Follow places at this scale (mm a px), solve for all, move the surface."""
-        tracks = self.tracks(state, scale, PLACES)
+    def round(self, state: _State, tracks: Tracks) -> tuple[_State, JointSolution]:
+        """Solve for all, then move the surface."""
         solution = self.solve(state, tracks)
         vertices = self.prior.vertices(solution.coefficients)
         vertices, _ = self.moved(vertices, tracks, solution.cameras)
-        return _State(solution.cameras, vertices), tracks, solution
+        return _State(solution.cameras, vertices), solution
 
     def tracks(self, state: _State, scale: float, places: int) -> Tracks:
         """Places of the surface that several photos show."""
@@ -200,11 +206,10 @@ def _largest_turn(before: Sequence[Camera], after: Sequence[Camera]) -> float:
     return float(angle_between(_rotations(before), _rotations(after)).max())
 
 
-def _scales(cameras: Sequence[Camera]) -> list[float]:
-    """No finer than half a pixel of the photos."""
+def _useful(scales: Sequence[float], cameras: Sequence[Camera]) -> list[float]:
+    """No finer than the photos, once as fine as they are."""
     finest = finest_mm_per_px(cameras)
-    useful = [scale for scale in SCALES_MM if scale > finest]
-    return [*useful, max(finest, SCALES_MM[-1])] if len(useful) < len(SCALES_MM) else useful
+    return sorted({max(scale, finest) for scale in scales}, reverse=True)
 
 
 def _skin_precision(tracks: Tracks, mesh: Mesh, generic: GenericHead) -> Float[Array, "n 3 3"]:

@@ -1,0 +1,105 @@
+"""The photos registered with each other, those without a face placed among them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mien.assets.generic import GenericHead
+from mien.capture.source import View
+from mien.model.dense.joint import Lenses
+from mien.model.dense.register import (
+    SCALES_MM,
+    Registration,
+    deviation_by_features,
+    register_views,
+)
+from mien.model.features import gather_features
+from mien.model.landmark_fit import Solution, focal_beliefs, residuals_of, same_lens
+from mien.model.place.view import place_views
+
+Progress = Callable[[int, int], None]
+
+NOTHING_SHARED = (
+    "the photos share too little skin to be registered with each other: cameras and shape rest on "
+    "marks and landmarks alone, which leaves cameras 5 to 15 degrees off where nothing was marked "
+    "by hand"
+)
+NOT_PLACED = "no face was found in it, and it does not look like the head that the others show"
+
+
+def register_solution(
+    solution: Solution,
+    faceless: Sequence[View],
+    generic: GenericHead,
+    progress: Progress | None = None,
+) -> Solution:
+    """The solution by all the skin that its photos share, with the photos placed by it added.
+
+    Args:
+        solution: from marks and landmarks.
+        faceless: photos of the same expression in which nothing is marked.
+    """
+    solution = _registered(solution, generic, SCALES_MM, progress)
+    if not faceless:
+        return solution
+    known = list(zip(solution.views, solution.cameras, strict=True))
+    cameras = place_views(faceless, known, solution.vertices, generic)
+    placed = [(view, camera) for view, camera in zip(faceless, cameras, strict=True) if camera]
+    missing = {
+        view.photo.name: NOT_PLACED
+        for view, camera in zip(faceless, cameras, strict=True)
+        if camera is None
+    }
+    if placed:
+        views, added = zip(*known, *placed, strict=True)
+        features = gather_features(views, generic)
+        wider = replace(
+            solution,
+            views=views,
+            features=features,
+            cameras=added,
+            residuals=residuals_of(features, added, solution.vertices),
+        )
+        # The others are where they belong: the closer looks are enough.
+        solution = _registered(wider, generic, SCALES_MM[2:], progress)
+    return replace(solution, problems=solution.problems | missing)
+
+
+def _registered(
+    solution: Solution,
+    generic: GenericHead,
+    scales: Sequence[float],
+    progress: Progress | None,
+) -> Solution:
+    views, lenses = solution.views, _lenses(solution.views)
+    known = (views, solution.cameras, solution.vertices, solution.features, lenses, generic)
+    found: Registration | None = None
+    if len(views) > 1:
+        found = register_views(*known, scales=scales, progress=progress)
+    if found is None:
+        notes = (NOTHING_SHARED,) if len(views) > 1 else ()
+        return replace(solution, uncertainty_mm=deviation_by_features(*known), notes=notes)
+    quality = found.quality
+    return replace(
+        solution,
+        cameras=found.cameras,
+        vertices=found.vertices,
+        residuals=residuals_of(solution.features, found.cameras, found.vertices),
+        uncertainty_mm=found.deviation_mm,
+        notes=quality.notes([view.photo.name for view in views]),
+        matches=tuple(zip(quality.shared.tolist(), quality.rms_px.tolist(), strict=True)),
+    )
+
+
+def _lenses(views: Sequence[View]) -> Lenses:
+    focal = focal_beliefs(views)
+    group = np.unique(same_lens(views), return_inverse=True)[1].reshape(-1)
+    count = np.bincount(group)
+    return Lenses(
+        group,
+        np.bincount(group, np.log(focal.focal_px)) / count,
+        np.bincount(group, focal.deviation) / count,
+    )
