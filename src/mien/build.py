@@ -27,6 +27,7 @@ from mien.texture.surface import SurfaceMap
 Progress = Callable[[str, int, int], None]
 """Told the stage, the steps done and their total."""
 
+SOLVING = "Solving cameras and shape"
 TURNTABLE = "turntable.mp4"
 
 
@@ -99,10 +100,15 @@ def build_head(
     if NEUTRAL not in capture.expressions:
         raise EstimationError(f"{source}: there is no folder called {NEUTRAL} among its folders")
     fits: dict[str, Fit] = {}
-    for done, (name, views) in enumerate(capture.expressions.items()):
-        tell("Solving cameras and shape", done, len(capture.expressions))
-        fits[name] = fit_views(views, generic, options.fit)
-    tell("Solving cameras and shape", len(fits), len(fits))
+    count = len(capture.expressions)
+    for number, (name, views) in enumerate(capture.expressions.items()):
+        tell(SOLVING, number, count)
+
+        def solving(done: int, total: int, number: int = number) -> None:
+            tell(SOLVING, number * total + done, count * total)
+
+        fits[name] = fit_views(views, generic, options.fit, progress=solving)
+    tell(SOLVING, count, count)
     head = _head(capture, fits, generic)
     textures, coverage = _extract_textures(head, capture, options, tell)
     return Build(replace(head, textures=textures), capture, fits, coverage)

@@ -56,6 +56,10 @@ def build(
     adjust: Annotated[
         bool, typer.Option(help="Adjust all cameras and points jointly after P02's five steps.")
     ] = True,
+    dense: Annotated[
+        bool,
+        typer.Option(help="Register several photos by all the skin that they share."),
+    ] = True,
     curves: Annotated[
         Curves, typer.Option(help="How drawn curves become points in the second photo and on.")
     ] = "epipolar",
@@ -87,7 +91,11 @@ def build(
 
     options = BuildOptions(
         fit=FitOptions(
-            adjust=adjust, curves=curves, kernel=kernel, interpupillary_mm=interpupillary_mm
+            adjust=adjust,
+            dense=dense,
+            curves=curves,
+            kernel=kernel,
+            interpupillary_mm=interpupillary_mm,
         ),
         fill=fill,
         texture_size=texture_size,
