@@ -14,6 +14,7 @@ from mien.build import Build, BuildOptions, build_head
 from mien.capture.source import Capture, View
 from mien.errors import EstimationError
 from mien.model.fit import FitOptions
+from mien.model.registration import NOTHING_SHARED
 from mien.texture.extract import Texture
 from mien.texture.surface import SurfaceMap
 from people import camera, person, photographed
@@ -68,7 +69,7 @@ def test_a_head_of_one_expression(calls: SimpleNamespace) -> None:
         assert item.rms_px == photo.rms_px
         assert item.points_used == len(photo.trusted)
         assert item.distrusted == {m.name: m.verdict for m in photo.marks if m.verdict}
-    assert result.notes == ("a.png: blurred",)
+    assert result.notes == ("a.png: blurred", NOTHING_SHARED)
 
 
 def test_options_reach_those_they_concern(calls: SimpleNamespace) -> None:
@@ -103,7 +104,7 @@ def test_a_photo_that_does_not_fit_is_named_in_the_notes(calls: SimpleNamespace)
     calls.capture = Capture("Ann", {"neutral": views})
     result = build_head("photos", options=OPTIONS)
     assert result.head.left_out == {"wrong.png": "shows 3 points, needs 6"}
-    assert result.notes == ("wrong.png was left out: shows 3 points, needs 6",)
+    assert result.notes == ("wrong.png was left out: shows 3 points, needs 6", NOTHING_SHARED)
     assert {count for count, _, _ in calls.photos} == {2}
 
 

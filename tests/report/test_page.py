@@ -114,7 +114,7 @@ def test_the_page_stands_alone(page: str) -> None:
         "turntable.mp4"
     ]
     # Six looks from around, four of the coverage, and every photo.
-    assert len(targets) == 1 + 6 + 4 + 2
+    assert len(targets) == 1 + 6 + 4 + 4 + 2
 
 
 def test_a_page_without_a_turntable(report_input: ReportInput) -> None:

@@ -12,6 +12,7 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.detector import NO_FACE
 from mien.capture.source import View
+from mien.errors import EstimationError
 from mien.model.deform import eye_centers
 from mien.model.features import gather_features
 from mien.model.landmark_fit import FitOptions, Solution, solve_by_features
@@ -75,6 +76,9 @@ def _fit_views(
 ) -> Fit:
     marked = [view for view in views if view.marked]
     faceless = [view for view in views if not view.marked]
+    if not marked:
+        names = ", ".join(view.photo.name for view in views)
+        raise EstimationError(f"{names}: {NO_FACE}")
     left_out: dict[str, str] = {}
     while True:
         solution = solve_by_features(marked, gather_features(marked, generic), generic, options)

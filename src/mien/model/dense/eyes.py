@@ -11,7 +11,7 @@ _LID_MM = 3.0
 """Skin this near to the generic head's eyeball lies on it."""
 _OPENING_MM = 1.0
 """Skin that touches it so closely is the lid's edge or inside."""
-_TRUST_MM = 2.0
+_TRUST_MM = 6.0
 """How far the eyeball moves from where the skin around it has carried it."""
 _ROUNDS = 10
 _EYEBALLS = ("left_eyeball", "right_eyeball")

@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+import numpy as np
+
+from marbled import GENERIC
+from mien.model.dense.eyes import seat_eyes
+
+VERTICES = GENERIC.mesh.vertices
+BALL = np.unique(GENERIC.mesh.triangles[GENERIC.mesh.triangles_of("left_eyeball")])
+SKIN = np.unique(GENERIC.mesh.triangles[GENERIC.mesh.triangles_of("skin")])
+
+
+def inside_mm(vertices: np.ndarray) -> float:
+    """How deep the deepest skin before the ball's centre lies inside the ball."""
+    centre = vertices[BALL].mean(axis=0)
+    radius = np.linalg.norm(vertices[BALL] - centre, axis=1).max()
+    near = SKIN[VERTICES[SKIN, 2] > centre[2] + 5]
+    return float(radius - np.linalg.norm(vertices[near] - centre, axis=1).min())
+
+
+def test_a_head_whose_eyes_sit_well_is_hardly_changed() -> None:
+    seated = seat_eyes(VERTICES, GENERIC)
+    assert np.abs(seated[BALL] - VERTICES[BALL]).max() < 0.5
+
+
+def test_a_ball_that_stands_out_goes_back() -> None:
+    out = VERTICES.copy()
+    out[BALL] += [0.5, 0.0, 2.5]
+    seated = seat_eyes(out, GENERIC)
+    away = np.linalg.norm((seated - VERTICES)[BALL].mean(axis=0))
+    assert away < 0.5 * np.linalg.norm([0.5, 0.0, 2.5])
+    assert inside_mm(seated) < max(inside_mm(VERTICES), 0.1) + 0.3
+    # As a whole: it stays as round as it was.
+    np.testing.assert_allclose(np.ptp((seated - out)[BALL], axis=0), 0, atol=1e-9)
+
+
+def test_lids_that_sink_in_are_lifted_out() -> None:
+    sunk = VERTICES.copy()
+    centre = VERTICES[BALL].mean(axis=0)
+    gap = np.linalg.norm(VERTICES - centre, axis=1)
+    lids = SKIN[(gap[SKIN] < 20) & (VERTICES[SKIN, 2] > centre[2] + 5)]
+    sunk[lids[::3], 2] -= 1.5
+    assert inside_mm(seat_eyes(sunk, GENERIC)) < inside_mm(sunk)
