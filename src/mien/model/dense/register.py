@@ -12,15 +12,17 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.source import View
 from mien.mesh import Mesh
+from mien.model.deform import deform_head
 from mien.model.dense.crops import finest_mm_per_px, visible_mesh
 from mien.model.dense.eyes import seat_eyes
 from mien.model.dense.joint import JointSolution, Lenses, PlacePrior, Sightings, solve_jointly
 from mien.model.dense.prior import HeadPrior, load_head_prior
-from mien.model.dense.quality import Quality, judge_registration
+from mien.model.dense.quality import FEW_PLACES, Quality, judge_registration
 from mien.model.dense.surface import NO_OFFSETS, Offsets, measure_offsets, move_surface
 from mien.model.dense.tracks import NO_TRACKS, Tracks, find_tracks
 from mien.model.dense.uncertainty import vertex_deviation
 from mien.model.features import Features
+from mien.model.rays import intersect_rays
 from mien.numeric.rotation import angle_between
 
 SCALES_MM = (2.0, 1.2, 0.8, 0.5)
@@ -37,8 +39,9 @@ HAIR_SD_MM = 10.0
 INDEPENDENT_PLACES = 150
 """What the prior does not express goes together over 15 to 20 mm of skin: however many places are
 followed on a face, they tell no more of the prior's coefficients than so many."""
-ATTACHED_SD_MM = 1.5
-"""How far a landmark's or mark's place lies off its attachment on the prior."""
+ATTACHED_SD_MM, NAMED_SD_MM = 1.5, 6.0
+"""How far a landmark's place lies off its attachment on the prior, and a hand-made mark's off the
+vertex of its name: people differ in what they mean by one, and marks count in the end, not here."""
 LANDMARK_SHARE = 4.0
 """Landmarks err together, not each by itself: so many times their sigma."""
 SETTLED_RAD = np.deg2rad(1.0)
@@ -78,8 +81,9 @@ def register_views(
 
     Args:
         cameras, vertices: from landmarks, within some 15 degrees.
-        features: landmarks and marks of the same photos; landmarks tell which place of the mesh
-            is which, marks the cameras as well.
+        features: landmarks and marks of the same photos. Landmarks tell what place of the mesh
+            is which, and lead the camera of a photo that shares too little with the others; marks
+            lead all cameras, and the head passes through them in the end.
         scales: mm a px, from round to round.
     Returns: None where the photos share too little that looks alike.
     """
@@ -100,7 +104,7 @@ def register_views(
     tell(len(scales), len(scales) + 1)
     finest = problem.tracks(state, max(FINEST_MM, finest_mm_per_px(state.cameras)), FINE_PLACES)
     vertices, offsets = problem.moved(state.vertices, finest, state.cameras)
-    vertices = seat_eyes(vertices, generic)
+    vertices = seat_eyes(_on_marks(vertices, features, state.cameras, generic), generic)
     count = len(solution.coefficients)
     deviation = vertex_deviation(
         solution.covariance[-count:, -count:], prior, finest, offsets, generic
@@ -169,8 +173,9 @@ class _Problem:
         photo, feature = np.nonzero(features.seen)
         by_hand = features.by_hand[photo, feature]
         sigma = features.sigma_px(state.cameras)[photo, feature]
-        # Landmarks lead the cameras only where nothing better does.
-        leading = by_hand | (len(tracks.photo) == 0)
+        # Landmarks lead a camera only where nothing better does.
+        alone = np.bincount(tracks.photo, minlength=len(self.views)) < FEW_PLACES
+        leading = by_hand | alone[photo]
         sigma = np.where(leading, sigma, LANDMARK_SHARE * sigma)
         crowding = np.sqrt(tracks.crowding)[tracks.place]
         sightings = Sightings(
@@ -186,7 +191,8 @@ class _Problem:
         def on(values: Array) -> Array:
             return np.concatenate([tracks.on(values), features.on(values)], axis=-2)
 
-        attached = np.tile(np.eye(3) / ATTACHED_SD_MM**2, (len(features.names), 1, 1))
+        attached_sd = np.where(features.by_hand.any(axis=0), NAMED_SD_MM, ATTACHED_SD_MM)
+        attached = np.eye(3) / attached_sd[:, None, None] ** 2
         mesh = self.generic.mesh.with_vertices(state.vertices)
         beliefs = PlacePrior(
             on(prior.mean),
@@ -196,6 +202,23 @@ class _Problem:
         return solve_jointly(
             state.cameras, on(state.vertices), sightings, beliefs, self.lenses, anchors=self.anchors
         )
+
+
+def _on_marks(
+    vertices: Float[Array, "v 3"],
+    features: Features,
+    cameras: Sequence[Camera],
+    generic: GenericHead,
+) -> Float[Array, "v 3"]:
+    """The head moved so that what was marked by hand lies where the photos show it."""
+    marked = features.by_hand.any(axis=0)
+    if not marked.any():
+        return vertices
+    image = np.where(features.by_hand[..., None], features.image_points, np.nan)[:, marked]
+    places = features.on(vertices)[marked]
+    goals = intersect_rays(cameras, image, current=places).points
+    deviation = np.where(features.by_hand, features.sigma_mm, np.inf).min(axis=0)[marked]
+    return deform_head(vertices, places, goals, generic, deviation_mm=deviation)
 
 
 def _rotations(cameras: Sequence[Camera]) -> Float[Array, "k 3 3"]:
