@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from mien.assets.generic import GenericHead
+from mien.camera import Camera
 from mien.capture.source import View
+from mien.errors import EstimationError
 from mien.model.dense.joint import Lenses
 from mien.model.dense.register import (
     SCALES_MM,
@@ -19,6 +21,7 @@ from mien.model.dense.register import (
 from mien.model.features import gather_features
 from mien.model.landmark_fit import Solution, focal_beliefs, residuals_of, same_lens
 from mien.model.place.view import place_views
+from mien.numeric.rotation import angle_between
 
 Progress = Callable[[int, int], None]
 
@@ -27,6 +30,8 @@ NOTHING_SHARED = (
     "marks and landmarks alone, which leaves cameras 5 to 15 degrees off where nothing was marked "
     "by hand"
 )
+FAR_TURN_DEG = 25.0
+"""Landmarks leave cameras up to 16 degrees off."""
 NOT_PLACED = "no face was found in it, and it does not look like the head that the others show"
 
 
@@ -77,20 +82,46 @@ def _registered(
     views, lenses = solution.views, _lenses(solution.views)
     known = (views, solution.cameras, solution.vertices, solution.features, lenses, generic)
     found: Registration | None = None
+    notes: tuple[str, ...] = ()
     if len(views) > 1:
-        found = register_views(*known, scales=scales, progress=progress)
+        try:
+            found = register_views(*known, scales=scales, progress=progress)
+            notes = () if found else (NOTHING_SHARED,)
+        except EstimationError as error:
+            notes = (
+                f"the photos could not be registered with each other ({error}): "
+                "cameras and shape rest on marks and landmarks alone",
+            )
     if found is None:
-        notes = (NOTHING_SHARED,) if len(views) > 1 else ()
         return replace(solution, uncertainty_mm=deviation_by_features(*known), notes=notes)
     quality = found.quality
+    names = [view.photo.name for view in views]
     return replace(
         solution,
         cameras=found.cameras,
         vertices=found.vertices,
         residuals=residuals_of(solution.features, found.cameras, found.vertices),
         uncertainty_mm=found.deviation_mm,
-        notes=quality.notes([view.photo.name for view in views]),
+        notes=(*quality.notes(names), *_far_turned(names, solution.cameras, found.cameras)),
         matches=tuple(zip(quality.shared.tolist(), quality.rms_px.tolist(), strict=True)),
+    )
+
+
+def _far_turned(
+    names: Sequence[str], before: Sequence[Camera], after: Sequence[Camera]
+) -> tuple[str, ...]:
+    """A note on each photo that registration has turned farther than landmarks can be wrong."""
+    turned = np.degrees(
+        angle_between(
+            np.stack([camera.R_cam_head for camera in before]),
+            np.stack([camera.R_cam_head for camera in after]),
+        )
+    )
+    return tuple(
+        f"{name}: was turned by {degrees:.0f} degrees from where landmarks put it; see whether the "
+        "mesh lies on the face"
+        for name, degrees in zip(names, turned, strict=True)
+        if degrees > FAR_TURN_DEG
     )
 
 
