@@ -29,6 +29,7 @@ class Case:
         title: of the row. person: folder of the scan. photos: folder of the photos.
         annotated: with the hand annotations beside the photos.
         adjust: with the joint adjustment; without it, P02's own way.
+        dense: with the photos registered by all the skin that they share.
     """
 
     title: str
@@ -36,14 +37,18 @@ class Case:
     photos: Path
     annotated: bool = False
     adjust: bool = True
+    dense: bool = True
 
 
 _JAMES = Path(__file__).parents[1] / "src" / "mien" / "assets" / "data" / "james"
+_EMILY = DATA / "emily" / "renders_mentalray"
 CASES = (
     Case("James, 2 photos, hand annotations", "james", _JAMES, annotated=True),
     Case("the same, `--no-adjust` (P02's own way)", "james", _JAMES, annotated=True, adjust=False),
-    Case("James, 2 photos, landmarks only", "james", _JAMES),
-    Case("Emily, 7 photos, landmarks only", "emily", DATA / "emily" / "renders_mentalray"),
+    Case("James, nothing marked", "james", _JAMES),
+    Case("the same, landmarks only (`--no-dense`)", "james", _JAMES, dense=False),
+    Case("Emily, 7 photos, nothing marked", "emily", _EMILY),
+    Case("Emily, landmarks only (`--no-dense`)", "emily", _EMILY, dense=False),
 )
 
 
@@ -52,7 +57,9 @@ def measure(case: Case, scan: Scan, generic: GenericHead) -> Outcome:
     views = load_capture(case.photos).views
     if not case.annotated:
         views = without_marks(views)
-    return outcome_of(fit_views(views, generic, FitOptions(adjust=case.adjust)), scan, generic)
+    return outcome_of(
+        fit_views(views, generic, FitOptions(adjust=case.adjust, dense=case.dense)), scan, generic
+    )
 
 
 HEADER = (
