@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -34,16 +33,16 @@ def normalize_contrast(
 
     def blurred(values: Array) -> Array:
         for _ in range(3):
-            values = np.asarray(cv2.blur(values, (side, side), borderType=cv2.BORDER_REFLECT))
+            values = np.asarray(cv2.blur(values, (side, side), borderType=cv2.BORDER_CONSTANT))
         return values
 
     inside = mask.astype(np.float32)
     share = np.maximum(blurred(inside), 1e-3)
-    mean = blurred(image * inside) / share
-    centered = (image - mean) * inside
+    centered = np.asarray(image, np.float32) * inside
+    centered -= blurred(centered) / share * inside
     # The running sums of a box filter can come out a hair below zero.
-    deviation = np.sqrt(np.maximum(blurred(centered * centered), 0) / share)
-    normalized: Array = centered / (deviation + _NOISE_FLOOR)
+    variance = np.maximum(blurred(centered * centered), 0) / share
+    normalized: Array = centered / (np.sqrt(variance) + _NOISE_FLOOR)
     return normalized
 
 
@@ -80,10 +79,17 @@ def _eight_bit(image: Array) -> Array:
     return np.clip(128 + _CONTRAST * image, 0, 255).astype(np.uint8)
 
 
-@cache
 def _searcher() -> Any:
+    """Not kept: it is not safe in two threads at once.
+
+    On rendered pairs with exact truth these settings are as near to it as the preset's, in less
+    than half the time (docs/registration.md).
+    """
     import cv2
 
     searcher = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     searcher.setFinestScale(0)
+    searcher.setPatchStride(5)
+    searcher.setGradientDescentIterations(12)
+    searcher.setVariationalRefinementIterations(2)
     return searcher

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mien.arrays import Array, Bool, Float
+from mien.arrays import Array, Bool, Float, Shaped
 from mien.mesh import Mesh
 from mien.model.dense.crops import Crop
 from mien.numeric.flow import local_correlation, match_images, normalize_contrast
@@ -23,6 +23,12 @@ _BEHIND_PX, _BEHIND_MM = 4.0, 3.0
 """A point this far behind the depth map of another view is hidden there."""
 _FEW = 100
 """Pixels that two views must share for a match to be tried."""
+_MARGIN_PX = 8
+"""Around what two views share: as much as is matched at once."""
+_EDGE_PX = 2
+"""At the edge of a crop, where interpolation lacks neighbours."""
+_ALL = 0.99
+"""A mask interpolated between its pixels: all of them are in it."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +49,10 @@ class Sight:
     def of(cls, crop: Crop, mesh: Mesh, normals: Float[Array, "v 3"]) -> Sight:
         both = np.concatenate([mesh.vertices, normals], axis=1)
         at = interpolate(crop.raster, mesh.triangles, both)
-        points, normal = at[..., :3], at[..., 3:]
-        to_camera = crop.camera.center - points
-        facing = (to_camera * normal).sum(-1) / np.maximum(
-            np.linalg.norm(to_camera, axis=-1) * np.linalg.norm(normal, axis=-1), 1e-9
-        )
+        points, normal = np.ascontiguousarray(at[..., :3]), at[..., 3:]
+        towards = crop.camera.center.astype(np.float32) - points
+        lengths = np.sqrt(_dot(towards, towards) * _dot(normal, normal))
+        facing = _dot(towards, normal) / np.maximum(lengths, 1e-9)
         return cls(crop, points, facing, crop.raster.mask & (facing > LEAST_FACING))
 
 
@@ -64,64 +69,91 @@ class Match:
 
 
 def match_sights(a: Sight, b: Sight) -> Match | None:
+    """Where b shows what each pixel of a shows; None where they share next to nothing.
+
+    Photo b is drawn through the surface as a's camera would see it, which takes out pose and
+    foreshortening but for the errors of cameras and surface: those are what is matched.
+    """
     import cv2
 
     predicted, shared = _predict(a, b)
     if np.count_nonzero(shared) < _FEW:
         return None
-    drawn = _sample(b.crop.grey, predicted)
-    radius = KEPT_DETAIL_MM * a.crop.camera.focal_px / float(a.crop.camera.t_cam_head[2])
-    ours = normalize_contrast(a.crop.grey, shared, radius / 2)
-    theirs = normalize_contrast(drawn, shared, radius / 2)
-    flow = match_images(ours, theirs)
-    rows, columns = np.mgrid[: shared.shape[0], : shared.shape[1]].astype(np.float32)
-    moved = np.stack([columns + flow[..., 0] + 0.5, rows + flow[..., 1] + 0.5], axis=-1)
+    window = _around(shared)
+    there, mask = predicted[window], shared[window]
+    radius = KEPT_DETAIL_MM / 2 * a.crop.camera.focal_px / float(a.crop.camera.t_cam_head[2])
+    ours = normalize_contrast(a.crop.grey[window], mask, radius)
+    theirs = normalize_contrast(_sample(b.crop.grey, there, cv2.INTER_CUBIC), mask, radius)
+    moved = match_images(ours, theirs) + _centres(mask)
     alike = local_correlation(ours, _sample(theirs, moved)) > LEAST_CORRELATION
-    within = _sample(shared.astype(np.float32), moved) > 0.99
-    inside = cv2.erode(shared.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    return Match(_sample(predicted, moved), alike & within & inside)
-
-
-def _predict(a: Sight, b: Sight) -> tuple[Float[Array, "h w 2"], Bool[Array, "h w"]]:
-    """Where b sees the surface behind a's pixels, and which of them both see."""
-    camera = b.crop.camera
-    shape = a.usable.shape
-    flat = a.points.reshape(-1, 3)
-    in_camera = camera.to_camera(flat)
-    depth = in_camera[:, 2].reshape(shape)
-    places = (camera.focal_px * in_camera[:, :2] / np.maximum(in_camera[:, 2:], 1e-6)) + (
-        camera.principal
-    )
-    predicted = places.reshape(*shape, 2).astype(np.float32)
-    nearest = _sample(np.where(b.crop.raster.mask, b.crop.raster.depth, 0), predicted, nearest=True)
-    slack = max(_BEHIND_MM, _BEHIND_PX * float(camera.t_cam_head[2]) / camera.focal_px)
-    facing = _sample(b.facing, predicted, nearest=True)
-    x, y = predicted[..., 0], predicted[..., 1]
-    within = (x > 1) & (x < camera.width - 1) & (y > 1) & (y < camera.height - 1)
-    shared: Array = a.usable & within & (depth < nearest + slack) & (facing > LEAST_FACING)
-    return predicted, shared
+    within = _sample(mask.astype(np.float32), moved) > _ALL
+    inside = cv2.erode(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    places, good = np.zeros_like(predicted), np.zeros_like(shared)
+    places[window], good[window] = _sample(there, moved), alike & within & inside
+    return Match(places, good)
 
 
 def check_match(there: Match, back: Match) -> tuple[Match, Float[Array, "h w"]]:
     """The match and by how many px of a the way back misses; what misses too far is no good."""
-    returned = _sample(back.places, there.places)
-    rows, columns = np.mgrid[: returned.shape[0], : returned.shape[1]] + 0.5
-    miss = np.hypot(returned[..., 0] - columns, returned[..., 1] - rows)
-    good = there.good & (_sample(back.good.astype(np.float32), there.places) > 0.99)
+    off = _sample(back.places, there.places) - _centres(there.good)
+    miss = np.hypot(off[..., 0], off[..., 1])
+    good = there.good & (_sample(back.good.astype(np.float32), there.places) > _ALL)
     return Match(there.places, good & (miss < ROUND_TRIP_PX)), miss
 
 
+def _predict(a: Sight, b: Sight) -> tuple[Float[Array, "h w 2"], Bool[Array, "h w"]]:
+    """Where b sees the surface behind a's pixels, and which of them both see."""
+    import cv2
+
+    camera = b.crop.camera
+    # Single precision is good to 1e-4 px.
+    in_camera = cv2.transform(a.points, np.column_stack([camera.R_cam_head, camera.t_cam_head]))
+    depth = np.maximum(in_camera[..., 2], 1.0)
+    scale = np.float32(camera.focal_px) / depth
+    x, y = (in_camera[..., i] * scale + np.float32(camera.principal[i]) for i in range(2))
+    predicted = np.stack([x, y], axis=-1)
+    nearest = _sample(b.crop.raster.depth, predicted, cv2.INTER_NEAREST)
+    facing = _sample(b.facing, predicted, cv2.INTER_NEAREST)
+    slack = max(_BEHIND_MM, _BEHIND_PX * float(camera.t_cam_head[2]) / camera.focal_px)
+    within = (x > _EDGE_PX) & (x < camera.width - _EDGE_PX)
+    within &= (y > _EDGE_PX) & (y < camera.height - _EDGE_PX)
+    shared: Array = a.usable & within & (depth < nearest + slack) & (facing > LEAST_FACING)
+    return predicted, shared
+
+
+def _around(mask: Bool[Array, "h w"]) -> tuple[slice, slice]:
+    """The rows and columns that hold all of the mask, and a margin."""
+    height, width = mask.shape
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return (
+        slice(max(rows[0] - _MARGIN_PX, 0), min(rows[-1] + 1 + _MARGIN_PX, height)),
+        slice(max(columns[0] - _MARGIN_PX, 0), min(columns[-1] + 1 + _MARGIN_PX, width)),
+    )
+
+
+def _centres(image: Shaped[Array, "h w"]) -> Float[Array, "h w 2"]:
+    """Of its pixels, px."""
+    height, width = image.shape
+    x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)
+    return np.stack(np.meshgrid(x + 0.5, y + 0.5), axis=-1)
+
+
+def _dot(a: Float[Array, "h w 3"], b: Float[Array, "h w 3"]) -> Float[Array, "h w"]:
+    product: Array = np.einsum("hwi,hwi->hw", a, b)
+    return product
+
+
 def _sample(
-    values: Float[Array, "h w ..."], places: Float[Array, "h w 2"], *, nearest: bool = False
+    values: Float[Array, "h w ..."], places: Float[Array, "h w 2"], how: int = 1
 ) -> Float[Array, "h w ..."]:
-    """Values at places in px; 0 outside of the image."""
+    """Values at places in px, 0 outside of the image; `how` is one of OpenCV's interpolations."""
     import cv2
 
     found: Array = cv2.remap(
         np.asarray(values, np.float32),
-        places[..., 0].astype(np.float32) - 0.5,
-        places[..., 1].astype(np.float32) - 0.5,
-        cv2.INTER_NEAREST if nearest else cv2.INTER_LINEAR,
+        places.astype(np.float32) - np.float32(0.5),
+        None,
+        how,
         borderMode=cv2.BORDER_CONSTANT,
         borderValue=0,
     )

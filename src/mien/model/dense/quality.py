@@ -9,7 +9,8 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int
 from mien.assets.generic import GenericHead
-from mien.model.dense.joint import POSE, JointSolution, matching_noise
+from mien.model.dense.joint import JointSolution, matching_noise
+from mien.model.dense.joint_problem import POSE
 from mien.model.dense.tracks import Tracks
 
 FEW_PLACES = 60

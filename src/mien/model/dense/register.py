@@ -196,7 +196,7 @@ class _Problem:
         mesh = self.generic.mesh.with_vertices(state.vertices)
         beliefs = PlacePrior(
             on(prior.mean),
-            np.ascontiguousarray(np.swapaxes(on(prior.components), 0, 1)),
+            on(prior.components),
             np.concatenate([_skin_precision(tracks, mesh, self.generic), attached]),
         )
         return solve_jointly(
