@@ -10,7 +10,7 @@ import pytest
 from marbled import at
 from mien.arrays import Array
 from mien.camera import Camera
-from mien.model.place.resect import FocalBelief, find_camera, refine_camera
+from mien.model.place.resect import FocalBelief, refine_camera
 from mien.numeric.robust import loss_named
 from mien.numeric.rotation import angle_between, rotation_from_vector
 
@@ -42,24 +42,6 @@ def cost(camera: Camera, places: Array, seen: Array) -> float:
     off = (((camera.project(places) - seen) / SIGMA_PX) ** 2).sum(axis=1)
     prior = np.log(camera.focal_px / BELIEF.focal_px) / BELIEF.deviation
     return float(loss_named("cauchy")(off)[0].sum() + prior**2)
-
-
-def test_most_pairs_may_be_wrong(places: Array, rng: np.random.Generator) -> None:
-    seen = TRUE.project(places)
-    seen[:50] = rng.uniform(0, 480, size=(50, 2))
-    found = find_camera(places, seen, TRUE, tolerance_px=2.0)
-    assert found is not None
-    assert degrees(found, TRUE) < 0.01
-    np.testing.assert_allclose(found.t_cam_head, TRUE.t_cam_head, rtol=1e-3, atol=0.1)
-
-
-def test_pairs_that_agree_on_nothing(places: Array, rng: np.random.Generator) -> None:
-    seen = rng.uniform(0, 480, size=(80, 2))
-    assert find_camera(places, seen, TRUE, tolerance_px=0.5) is None
-
-
-def test_few_pairs(places: Array) -> None:
-    assert find_camera(places[:5], TRUE.project(places[:5]), TRUE, tolerance_px=2.0) is None
 
 
 def test_refined_camera_is_the_optimum(places: Array, rng: np.random.Generator) -> None:

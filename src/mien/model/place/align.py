@@ -13,7 +13,7 @@ from mien.model.place.resect import FocalBelief, refine_camera
 from mien.numeric.flow import local_correlation, match_images, normalize_contrast
 
 _MARGIN_MM = 20.0
-_DETAIL_MM = 4.0
+_DETAIL_MM = 2.0
 """Contrast is compared over about this distance: wider shading differs from photo to photo."""
 _ALIKE = 0.5
 _LEAST_ENERGY = 0.25

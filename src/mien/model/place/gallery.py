@@ -19,7 +19,8 @@ PX_PER_MM = 2.0
 """Of the reduced photos, and the finest that is painted: a head is some 500 px high."""
 _SHOWN = ("skin", "left_eyeball", "right_eyeball")
 _NEAREST_PHOTOS = 3
-"""A picture is painted with the photos taken from nearest by; more only blur it."""
+"""A picture is painted with the photo taken from nearest by; the next ones fill its gaps. Blending
+them costs matches: photos differ in exposure, and cameras and shape are never exact."""
 _JUMP_MM, _CLEAR_MM = 6.0, 6.0
 """Depth that changes more from one pixel to the next is an edge. Near one a photo counts less: a
 small error of the shape puts there what is behind."""
@@ -84,14 +85,14 @@ class Gallery:
         places = np.full((*seen.shape, 3), np.nan)
         places[seen] = camera.unproject(pixels, raster.depth[seen].astype(np.float64))
         normals = interpolate(raster, self.mesh.triangles, self._normals)[seen]
-        total, weights = np.zeros((2, len(pixels)), np.float32)
+        best, weights = np.zeros((2, len(pixels)), np.float32)
         for photo in self._nearest(camera):
             grey, weight = _told_by(photo, places[seen], normals)
-            total += weight * grey
-            weights += weight
+            missing = weights <= _LEAST_WEIGHT
+            best[missing], weights[missing] = grey[missing], weight[missing]
         known, image = np.zeros(seen.shape, bool), np.full(seen.shape, _UNKNOWN_GREY, np.uint8)
         known[seen] = told = weights > _LEAST_WEIGHT
-        image[known] = np.rint(total[told] / weights[told])
+        image[known] = np.rint(best[told])
         return Painting(image, known, places)
 
     def _nearest(self, camera: Camera) -> list[_Known]:

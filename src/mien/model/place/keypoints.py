@@ -9,8 +9,8 @@ import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int, UInt8
 
-_CONTRAST = 0.015
-"""SIFT's threshold, under half of the usual: skin is smooth."""
+_CONTRAST = 0.008
+"""SIFT's threshold, a fifth of the usual: skin is smooth."""
 _MOST = 2500
 _NEAREST_RATIO = 0.8
 """Lowe's test: the second nearest must be this much farther than the nearest."""

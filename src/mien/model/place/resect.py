@@ -13,8 +13,6 @@ from mien.numeric.lm import minimize_lm
 from mien.numeric.robust import loss_named
 from mien.numeric.rotation import cross_matrix, rotation_from_vector
 
-_FEWEST = 6
-_TRIES = 3000
 _NEAREST_MM = 150.0
 """No photo of a head is taken from nearer by."""
 
@@ -25,42 +23,6 @@ class FocalBelief:
 
     focal_px: float
     deviation: float
-
-
-def find_camera(
-    places: Float[Array, "n 3"],
-    image_points: Float[Array, "n 2"],
-    template: Camera,
-    *,
-    tolerance_px: float,
-) -> Camera | None:
-    """The camera that most of the pairs agree on; None where hardly any do.
-
-    Args:
-        places: (N, 3) mm. image_points: (N, 2) px; most pairs may be wrong.
-        template: gives the image's size, principal point and focal length.
-        tolerance_px: how far a pair that agrees may lie off.
-    Source: RANSAC over EPnP (Lepetit, Moreno-Noguer, Fua 2009).
-    """
-    import cv2
-
-    if len(places) < _FEWEST:
-        return None
-    focal, (x, y) = template.focal_px, template.principal
-    found, vector, shift, agreeing = cv2.solvePnPRansac(
-        places,
-        image_points,
-        np.array([[focal, 0, x], [0, focal, y], [0, 0, 1]]),
-        None,
-        iterationsCount=_TRIES,
-        reprojectionError=tolerance_px,
-        confidence=0.9999,
-        flags=cv2.SOLVEPNP_EPNP,
-    )
-    if not found or agreeing is None or len(agreeing) < _FEWEST or shift[2, 0] < _NEAREST_MM:
-        return None
-    rotation = rotation_from_vector(vector.ravel())
-    return replace(template, R_cam_head=rotation, t_cam_head=shift.ravel())
 
 
 def refine_camera(

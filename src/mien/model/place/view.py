@@ -28,7 +28,7 @@ LEAST_AGREEMENT, AGREEMENT_MM = 0.35, 1.5
 """Share of the head that looks alike within so many mm. Measured: 0.5 to 0.95 where a camera is
 right, up to 0.21 for mirrored photos, for another head in the same skin, for wrong cameras
 (docs/registration-profiles.md)."""
-_LEAST_AREA_MM2 = 2000.0
+_LEAST_AREA_MM2 = 1000.0
 
 
 def place_view(
@@ -40,8 +40,8 @@ def place_view(
     """The camera of a photo, found by what it shows of a head that other photos show, too.
 
     Features of the photo are matched with how the head looks from several sides, painted with the
-    colours of the other photos. A camera that matches agree on is refined by laying the photo
-    over the head painted as that camera sees it, and accepted only if they look alike in the end.
+    colours of the other photos. The looks that match best are refined by laying the photo over
+    the head, painted as the camera sees it, and the best is accepted only if both look alike.
 
     Args:
         others: photos of the same person with the same expression, and their cameras.
@@ -121,7 +121,9 @@ class _Placer:
         depth = focal.focal_px / (self.relative_scale * max(photo.size))
         template = Camera(*photo.size, focal.focal_px, np.eye(3), np.array([0, 0, depth]))
         grey = reduced(photo.pixels, _SEARCH_SIDE / max(photo.size))
-        starts = find_starts(grey, resized_to(template, grey.shape), self.looks, self.gallery)
+        starts = find_starts(
+            grey, resized_to(template, grey.shape), self.looks, self.gallery.center
+        )
         return [
             replace(template, R_cam_head=start.R_cam_head, t_cam_head=start.t_cam_head)
             for start in starts
