@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from mien.arrays import Array
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
+from mien.capture.landmarks import Landmarks
 from mien.capture.photos import Photo
 from mien.capture.source import View
 from mien.numeric.raster import interpolate, rasterize
@@ -70,3 +71,12 @@ def photographed(who: Person, yaws: tuple[float, ...]) -> list[tuple[View, Camer
     """Photos from these sides with their cameras."""
     cameras = [at(yaw, 4 * (-1) ** k) for k, yaw in enumerate(yaws)]
     return [(who.seen_by(item, name=f"{k}.png"), item) for k, item in enumerate(cameras)]
+
+
+def detected(view: View, seen_from: Camera, vertices: Array, *, off_mm: float = 2.0) -> View:
+    """The photo with landmarks that lie off by so much."""
+    rng = np.random.default_rng(abs(int(seen_from.center[0])))
+    points = seen_from.project(GENERIC.landmark_positions(vertices))
+    points = points + off_mm * PX_PER_MM * rng.normal(size=points.shape)
+    landmarks = Landmarks(points, np.ones(478), np.zeros(52), seen_from.R_cam_head)
+    return replace(view, landmarks=landmarks)

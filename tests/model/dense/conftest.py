@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from marbled import Person, photographed
+from marbled import Person, detected, photographed
 from mien.camera import Camera
 from mien.capture.source import View
 from people import person
@@ -17,5 +17,6 @@ def ann() -> Person:
 
 @pytest.fixture(scope="session")
 def photos(ann: Person) -> list[tuple[View, Camera]]:
-    """Photos of her from four sides with their true cameras."""
-    return photographed(ann, (-32.0, -10.0, 12.0, 30.0))
+    """Photos of her from four sides with their true cameras and rough landmarks."""
+    exact = photographed(ann, (-32.0, -10.0, 12.0, 30.0))
+    return [(detected(view, camera, ann.vertices), camera) for view, camera in exact]

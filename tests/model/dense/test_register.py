@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from marbled import GENERIC, SHOWN, Person
+from marbled import GENERIC, SHOWN, Person, detected
 from mien.arrays import Array
 from mien.camera import Camera
 from mien.capture.source import View
@@ -124,7 +124,9 @@ def test_another_expression_in_one_photo_is_noticed(ann: Person, photos: Photos)
     index = GENERIC.unit_names.index("jawOpen")
     spoken = Person(ann.vertices + 0.7 * GENERIC.unit_offsets[index], ann.skin)
     mixed = [*photos]
-    mixed[1] = (spoken.seen_by(photos[1][1], name="spoken.png"), photos[1][1])
+    camera = photos[1][1]
+    seen = spoken.seen_by(camera, name="spoken.png")
+    mixed[1] = (detected(seen, camera, spoken.vertices), camera)
     views, cameras = zip(*mixed, strict=True)
     features = gather_features(views, GENERIC)
     result = register_views(

@@ -18,7 +18,7 @@ FEW_PLACES = 60
 UNSURE_TURN_DEG = 2.0
 _WRONG_SIGMAS = 3.0
 """An observation this many times the usual error off disagrees with the other photos."""
-_ODD_SHARE, _ODD_RATIO, _ODD_PLACES = 0.25, 3.0, 20
+_ODD_SHARE, _ODD_RATIO, _ODD_PLACES = 0.25, 2.0, 20
 """A region of a photo differs when so much of it disagrees, so many times more than in the other
 photos, judged by at least so many places."""
 REGIONS = {"mouth": "the mouth", "eyes": "the eyes", "forehead": "the forehead"}
