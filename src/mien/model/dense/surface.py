@@ -15,7 +15,9 @@ from mien.camera import Camera
 from mien.mesh import Mesh
 from mien.model.deform import with_round_eyes
 from mien.model.dense.joint import matching_noise
+from mien.model.dense.projection import Pinholes, project_places
 from mien.model.dense.tracks import Tracks
+from mien.numeric.groups import GroupSums
 
 BENDING = 3.0
 """How stiff the surface is: weight (mm^2) of its squared mean bending against squared offsets over
@@ -54,30 +56,20 @@ def measure_offsets(
     start = tracks.on(mesh.vertices)
     normals = tracks.on(mesh.vertex_normals())
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    rotation = np.stack([camera.R_cam_head for camera in cameras])[tracks.photo]
-    shift = np.stack([camera.t_cam_head for camera in cameras])[tracks.photo]
-    focal = np.array([camera.focal_px for camera in cameras])[tracks.photo]
-    principal = np.stack([camera.principal for camera in cameras])[tracks.photo]
-    gather = _gather(tracks.place, len(start))
+    pinholes, by_place = Pinholes.of(cameras), GroupSums(tracks.place, len(start))
+    principal = np.stack([camera.principal for camera in cameras])
+    image = tracks.image_points - principal[tracks.photo]
     weak = np.eye(3) / _FAR_MM**2
     places = start
     for _ in range(rounds):
-        x, y, z = (np.einsum("mij,mj->mi", rotation, places[tracks.place]) + shift).T
-        scale = focal / z
-        residuals = np.column_stack([scale * x, scale * y]) + principal - tracks.image_points
-        by_point = np.zeros((len(x), 2, 3))
-        by_point[:, 0, 0] = by_point[:, 1, 1] = scale
-        by_point[:, 0, 2], by_point[:, 1, 2] = -scale * x / z, -scale * y / z
-        by_place = by_point @ rotation
+        seen = project_places(pinholes, tracks.photo, places[tracks.place])
+        residuals = seen.image_points - image
         squared = (residuals**2).sum(axis=1) / tracks.sigma_px**2
-        weighted = by_place / (tracks.sigma_px**2 * (1 + squared / 4))[:, None, None]
-        information = weak + (
-            gather @ (np.swapaxes(by_place, 1, 2) @ weighted).reshape(-1, 9)
-        ).reshape(-1, 3, 3)
-        gradient = gather @ np.einsum("mij,mi->mj", weighted, residuals)
-        gradient += (places - start) @ weak
-        covariance = np.linalg.inv(information)
-        places = places - np.einsum("nij,nj->ni", covariance, gradient)
+        weights = 1 / (tracks.sigma_px**2 * (1 + squared / 4))
+        weighted = np.swapaxes(weights[:, None, None] * seen.by_place, 1, 2)
+        covariance = np.linalg.inv(weak + by_place(weighted @ seen.by_place))
+        gradient = by_place((weighted @ residuals[..., None])[..., 0]) + (places - start) @ weak
+        places = places - (covariance @ gradient[..., None])[..., 0]
     offsets: Array = ((places - start) * normals).sum(axis=1)
     sd = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariance, normals))
     # Places that share a patch of the matching share its error.
@@ -249,10 +241,3 @@ def _laplacian(vertices: Array, triangles: Array) -> tuple[Any, Array]:
     )
     degree = diags(np.asarray(weights.sum(axis=1)).ravel())
     return degree - weights, np.maximum(areas, 1e-3)
-
-
-def _gather(index: Array, count: int) -> Any:
-    from scipy.sparse import csr_matrix
-
-    size = len(index)
-    return csr_matrix((np.ones(size), (index, np.arange(size))), shape=(count, size))
