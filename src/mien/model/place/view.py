@@ -24,7 +24,7 @@ _ROUGH_PX_PER_MM = 1.0
 _ROUGH_SIGMAS_MM, _FINE_SIGMA_MM = (3.0, 2.0), 1.0
 """How far matches of the rounds may miss: shape and cameras are off, too."""
 _PROMISING, _PROMISING_MM = 0.5, 4.0
-LEAST_AGREEMENT, AGREEMENT_MM = 0.35, 1.5
+LEAST_AGREEMENT, AGREEMENT_MM = 0.45, 1.5
 """Share of the head that looks alike within so many mm. Measured: 0.5 to 0.95 where a camera is
 right, up to 0.21 for mirrored photos, for another head in the same skin, for wrong cameras
 (docs/registration-profiles.md)."""
