@@ -1,6 +1,6 @@
-"""Work on rows of an image, shared by threads; the result never depends on how many.
+"""Work shared by threads; the result never depends on how many.
 
-The kernels are Numba functions compiled with `nogil`, called on bands of rows from a pool of
+Kernels are Numba functions compiled with `nogil`, called on bands of an image's rows from a pool of
 Python threads. Numba's own `parallel=True` takes longer to compile, and its default threading
 layer must not be entered by two threads at once.
 """
@@ -10,8 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from typing import TypeVar
 
 import numba
+
+_Result = TypeVar("_Result")
 
 # Below this much work (pixels, roughly) waking a second thread costs more than it saves.
 _SERIAL_WORK = 20_000
@@ -40,3 +43,23 @@ def for_row_bands(kernel: Callable[[int, int], object], rows: int, *, work: int)
     tasks = [_pool(threads).submit(kernel, *edges[band : band + 2]) for band in range(bands)]
     for task in tasks:
         task.result()
+
+
+def side_by_side(*tasks: Callable[[], _Result]) -> list[_Result]:
+    """What each task returns; they run at once, in as many threads as Numba uses.
+
+    Args:
+        tasks: release the GIL most of the time, share nothing that they change, and do not call
+            this function.
+    """
+    threads = int(numba.get_num_threads())
+    if threads == 1:
+        return [task() for task in tasks]
+    # A pool of their own: a task may wait for row bands, which must find idle threads.
+    running = [_task_pool(threads).submit(task) for task in tasks]
+    return [task.result() for task in running]
+
+
+@cache
+def _task_pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, thread_name_prefix="mien-tasks")

@@ -11,6 +11,7 @@ from mien.mesh import Mesh
 from mien.model.dense.crops import Crop
 from mien.numeric.flow import local_correlation, match_images, normalize_contrast
 from mien.numeric.raster import interpolate
+from mien.numeric.threads import side_by_side
 
 KEPT_DETAIL_MM = 10.0
 """Patterns larger than this are taken for shading and removed before matching."""
@@ -68,6 +69,10 @@ class Match:
     good: Bool[Array, "h w"]
 
 
+Checked = tuple[Match, Float[Array, "h w"]]
+"""A match and by how many px the way back misses."""
+
+
 def match_sights(a: Sight, b: Sight) -> Match | None:
     """Where b shows what each pixel of a shows; None where they share next to nothing.
 
@@ -93,7 +98,15 @@ def match_sights(a: Sight, b: Sight) -> Match | None:
     return Match(places, good)
 
 
-def check_match(there: Match, back: Match) -> tuple[Match, Float[Array, "h w"]]:
+def match_both(a: Sight, b: Sight) -> tuple[Checked, Checked] | None:
+    """a's pixels in b and b's in a, checked by each other; None where they share nothing."""
+    there, back = side_by_side(lambda: match_sights(a, b), lambda: match_sights(b, a))
+    if there is None or back is None:
+        return None
+    return check_match(there, back), check_match(back, there)
+
+
+def check_match(there: Match, back: Match) -> Checked:
     """The match and by how many px of a the way back misses; what misses too far is no good."""
     off = _sample(back.places, there.places) - _centres(there.good)
     miss = np.hypot(off[..., 0], off[..., 1])

@@ -12,7 +12,7 @@ from mien.camera import Camera
 from mien.capture.source import View
 from mien.mesh import Mesh
 from mien.model.dense.crops import Crop, crop_view
-from mien.model.dense.matching import Match, Sight, check_match, match_sights
+from mien.model.dense.matching import Checked, Sight, match_both
 from mien.model.dense.neighbours import choose_pairs
 
 MATCH_SIGMA_PX = 0.04
@@ -97,11 +97,11 @@ def find_tracks(
         one, other = gathered[a], gathered[b]
         if one is None or other is None:
             continue
-        there, back = match_sights(one.view, other.view), match_sights(other.view, one.view)
-        if there is None or back is None:
+        matches = match_both(one.view, other.view)
+        if matches is None:
             continue
-        one.add(b, check_match(there, back), other.view.crop)
-        other.add(a, check_match(back, there), one.view.crop)
+        one.add(b, matches[0], other.view.crop)
+        other.add(a, matches[1], one.view.crop)
     parts = [seen.tracks(mesh, round(share)) for seen in gathered if seen and seen.photos]
     return _joined(parts) if parts else NO_TRACKS
 
@@ -134,7 +134,7 @@ class _Observations:
         self.places: list[Array] = []
         self.sigma: list[Array] = []
 
-    def add(self, photo: int, match: tuple[Match, Array], crop: Crop) -> None:
+    def add(self, photo: int, match: Checked, crop: Crop) -> None:
         """What `photo`, seen as `crop`, shows of the grid, and by how much the way back misses."""
         at = self.grid.rows, self.grid.columns
         found, miss = match
