@@ -94,11 +94,13 @@ def judge_registration(tracks: Tracks, solution: JointSolution, generic: Generic
 
 
 def _turn_deviations(solution: JointSolution, photos: int) -> Float[Array, " k"]:
+    covariance = solution.covariance
+    rotations = [camera.R_cam_head for camera in solution.cameras]
     deviations = np.zeros(photos)
     for k in range(1, photos):
-        first, own = slice(0, 3), slice(POSE * k, POSE * k + 3)
-        covariance = solution.covariance
-        both = covariance[first, first] + covariance[own, own]
-        both = both - covariance[first, own] - covariance[own, first]
-        deviations[k] = np.sqrt(max(float(np.trace(both)), 0.0))
+        # Each photo's unknowns turn its own camera's space.
+        by_turns = np.zeros((3, len(covariance)))
+        by_turns[:, :3] = -rotations[k] @ rotations[0].T
+        by_turns[:, POSE * k : POSE * k + 3] = np.eye(3)
+        deviations[k] = np.sqrt(max(float(np.trace(by_turns @ covariance @ by_turns.T)), 0.0))
     return deviations
