@@ -73,7 +73,7 @@ Checked = tuple[Match, Float[Array, "h w"]]
 """A match and by how many px the way back misses."""
 
 
-def match_sights(a: Sight, b: Sight) -> Match | None:
+def match_sights(a: Sight, b: Sight, *, fine: bool = False) -> Match | None:
     """Where b shows what each pixel of a shows; None where they share next to nothing.
 
     Photo b is drawn through the surface as a's camera would see it, which takes out pose and
@@ -89,7 +89,7 @@ def match_sights(a: Sight, b: Sight) -> Match | None:
     radius = KEPT_DETAIL_MM / 2 * a.crop.camera.focal_px / float(a.crop.camera.t_cam_head[2])
     ours = normalize_contrast(a.crop.grey[window], mask, radius)
     theirs = normalize_contrast(_sample(b.crop.grey, there, cv2.INTER_CUBIC), mask, radius)
-    moved = match_images(ours, theirs) + _centres(mask)
+    moved = match_images(ours, theirs, fine=fine) + _centres(mask)
     alike = local_correlation(ours, _sample(theirs, moved)) > LEAST_CORRELATION
     within = _sample(mask.astype(np.float32), moved) > _ALL
     inside = cv2.erode(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
@@ -98,9 +98,15 @@ def match_sights(a: Sight, b: Sight) -> Match | None:
     return Match(places, good)
 
 
-def match_both(a: Sight, b: Sight) -> tuple[Checked, Checked] | None:
-    """a's pixels in b and b's in a, checked by each other; None where they share nothing."""
-    there, back = side_by_side(lambda: match_sights(a, b), lambda: match_sights(b, a))
+def match_both(a: Sight, b: Sight, *, fine: bool = False) -> tuple[Checked, Checked] | None:
+    """a's pixels in b and b's in a, checked by each other; None where they share nothing.
+
+    Args:
+        fine: as in match_images.
+    """
+    there, back = side_by_side(
+        lambda: match_sights(a, b, fine=fine), lambda: match_sights(b, a, fine=fine)
+    )
     if there is None or back is None:
         return None
     return check_match(there, back), check_match(back, there)

@@ -73,6 +73,7 @@ def find_tracks(
     mm_per_px: float,
     places: int,
     neighbours: int = 3,
+    fine: bool = False,
 ) -> Tracks:
     """Every photo's grid of surface places, found again in its neighbours.
 
@@ -82,7 +83,7 @@ def find_tracks(
 
     Args:
         mesh: what the photos show (crops.visible_mesh). mm_per_px: scale at which to match.
-        places: about how many to follow, over all photos.
+        places: about how many to follow, over all photos. fine: as in match_images.
     """
     share = places / max(1, len(views))
     normals = mesh.vertex_normals()
@@ -97,7 +98,7 @@ def find_tracks(
         one, other = gathered[a], gathered[b]
         if one is None or other is None:
             continue
-        matches = match_both(one.view, other.view)
+        matches = match_both(one.view, other.view, fine=fine)
         if matches is None:
             continue
         one.add(b, matches[0], other.view.crop)
