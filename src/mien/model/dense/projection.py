@@ -9,6 +9,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int
 from mien.camera import Camera
+from mien.errors import EstimationError
 
 UNKNOWNS = 7
 """Of a photo: rotation vector (rad), shift in x and y (mm), log depth, log focal length."""
@@ -67,10 +68,15 @@ class Projection:
 def project_places(
     pinholes: Pinholes, photo: Int[Array, " m"], places: Float[Array, "m 3"]
 ) -> Projection:
-    """Place m as photo[m] sees it. places: (M, 3) mm, head space, before the camera."""
+    """Place m, (M, 3) mm in head space, as photo[m] sees it.
+
+    Raises: EstimationError: a place lies behind its camera.
+    """
     R, t = pinholes.R[photo], pinholes.t[photo]
     turned = (R @ places[..., None])[..., 0]
     x, y, z = (turned + t).T
+    if not (z > 0).all():
+        raise EstimationError("a place on the head has come to lie behind a camera that sees it")
     scale = pinholes.focal_px[photo] / z
     by_turned = np.zeros((len(places), 2, 3))
     by_turned[:, 0, 0] = by_turned[:, 1, 1] = scale
