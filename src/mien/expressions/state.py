@@ -1,0 +1,67 @@
+"""What a face does at one moment, and the surface that follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from mien.arrays import Array, Float, check_array, frozen
+
+FACE = "face"
+"""The name under which weights hold everywhere in the face."""
+
+
+@dataclass(frozen=True)
+class Gaze:
+    """Where the eyes look, radians from straight ahead.
+
+    Attributes:
+        yaw: positive to the subject's left. pitch: positive up.
+    Raises: InputError: not finite.
+    """
+
+    yaw: float = 0.0
+    pitch: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_array("gaze", (self.yaw, self.pitch), (2,))
+
+
+@dataclass(frozen=True)
+class FaceState:
+    """What a face does at one moment.
+
+    Attributes:
+        expressions: weights of photographed expressions by region: {"face": {"joy": 0.6}} holds
+            everywhere, {"mouth": {"anger": 0.4}} instead of it in the mouth, {"left_mouth": ...}
+            instead of both in its left half. What is missing to 1 is neutral's.
+        units: weights of face units by name; 0 to 1 is their usual range.
+        gaze: where the eyes look.
+    """
+
+    expressions: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    units: Mapping[str, float] = field(default_factory=dict)
+    gaze: Gaze = field(default_factory=Gaze)
+
+
+@dataclass(frozen=True)
+class PosedFace:
+    """The consensus geometry, and whose texture shows how much at every vertex.
+
+    Attributes:
+        vertices: (V, 3) mm, head space.
+        weights: (V, K) one for each of the rig's textures, summing to 1 at every vertex; from -0.5
+            to 1.5, for a face may go past what was photographed.
+        brightness: (V,) factor on the colours: eyes and teeth in the shadow of lids and lips.
+    """
+
+    vertices: Float[Array, "v 3"]
+    weights: Float[Array, "v k"]
+    brightness: Float[Array, " v"]
+
+    def __post_init__(self) -> None:
+        count = len(self.vertices)
+        for name, shape in (("vertices", (count, 3)), ("brightness", (count,))):
+            object.__setattr__(self, name, frozen(check_array(name, getattr(self, name), shape)))
+        weights = check_array("weights", self.weights, (count, None))
+        object.__setattr__(self, "weights", frozen(weights))
