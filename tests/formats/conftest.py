@@ -13,8 +13,10 @@ import pytest
 
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
+from mien.formats.gltf_animation import GlbAnimation
 from mien.mesh import Mesh
 from mien.model.head import Expression, FittedView, Head
+from mien.numeric.rotation import rotation_from_vector
 
 HERE = Path(__file__).parent
 COLUMNS, ROWS = 12, 7
@@ -84,6 +86,21 @@ def small_head() -> Head:
         unit_offsets=offsets.astype(np.float32),
         textures={name: _checker(seed) for seed, name in enumerate(("atlas", "cylinder", "joy"))},
         left_out={"blurred.jpg": "no face was found"},
+    )
+
+
+@pytest.fixture
+def nod() -> GlbAnimation:
+    """The mouth opens while the head turns right round about a slanted axis and moves off."""
+    times = np.array([0.0, 0.25, 0.5, 1.25, 2.0])
+    turn = times[:, None] / 2 * 2 * np.pi * np.array([0.6, 0.8, 0.0])
+    return GlbAnimation(
+        times=times,
+        target_names=("joy", "jawOpen"),
+        weights=np.column_stack([times / 4, [0.0, 0.5, 1.0, -0.25, 1.25]]),
+        rotations=rotation_from_vector(turn),
+        translations_mm=times[:, None] * [10.0, -20.0, 5.0],
+        name="nod",
     )
 
 

@@ -1,8 +1,5 @@
 from __future__ import annotations
 
-import io
-import json
-import struct
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,59 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from PIL import Image
 
+from glb_file import Glb
 from mien.errors import InputError
 from mien.formats.gltf import glb_bytes, save_glb
 from mien.model.head import Head
-
-KINDS = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
-
-
-class Glb:
-    """A .glb taken apart by the letter of the specification, independently of the writer."""
-
-    def __init__(self, data: bytes) -> None:
-        magic, version, length = struct.unpack_from("<4sII", data)
-        assert (magic, version, length) == (b"glTF", 2, len(data))
-        size, kind = struct.unpack_from("<I4s", data, 12)
-        assert kind == b"JSON"
-        self.json: dict[str, Any] = json.loads(data[20 : 20 + size])
-        self.binary = data[28 + size :]
-        assert struct.unpack_from("<I4s", data, 20 + size) == (len(self.binary), b"BIN\0")
-        self.primitives = self.json["meshes"][0]["primitives"]
-        self.material_names = [item["name"] for item in self.json["materials"]]
-
-    def view(self, index: int) -> bytes:
-        view = self.json["bufferViews"][index]
-        return self.binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
-
-    def array(self, index: int) -> np.ndarray:
-        accessor = self.json["accessors"][index]
-        shape = accessor["count"], WIDTHS[accessor["type"]]
-        values = np.zeros(shape, KINDS[accessor["componentType"]])
-        if "bufferView" in accessor:
-            data = self.view(accessor["bufferView"])
-            values = np.frombuffer(data, values.dtype).reshape(shape).copy()
-        if "sparse" in accessor:
-            rows, new = (accessor["sparse"][key] for key in ("indices", "values"))
-            where = np.frombuffer(self.view(rows["bufferView"]), KINDS[rows["componentType"]])
-            values[where] = np.frombuffer(self.view(new["bufferView"]), "<f4").reshape(-1, 3)
-        return values
-
-    def primitive(self, material: str) -> dict[str, Any]:
-        return self.primitives[self.material_names.index(material)]
-
-    def corners(self, primitive: dict[str, Any], attribute: str) -> np.ndarray:
-        """(F, 3, ...) what the triangles' corners have."""
-        triangles = self.array(primitive["indices"]).reshape(-1, 3)
-        return self.array(primitive["attributes"][attribute])[triangles]
-
-    def target(self, primitive: dict[str, Any], name: str) -> np.ndarray:
-        names = self.json["meshes"][0]["extras"]["targetNames"]
-        triangles = self.array(primitive["indices"]).reshape(-1, 3)
-        return self.array(primitive["targets"][names.index(name)]["POSITION"])[triangles]
 
 
 @pytest.mark.parametrize("lit", [True, False])
@@ -159,9 +108,36 @@ def test_an_expression_with_a_units_name_gets_another(small_head: Head) -> None:
 
 def test_the_texture_is_embedded_exactly_as_png(small_head: Head) -> None:
     glb = Glb(glb_bytes(small_head, image="PNG"))
-    data = glb.view(glb.json["images"][0]["bufferView"])
-    pixels = np.asarray(Image.open(io.BytesIO(data)))
-    np.testing.assert_array_equal(pixels, small_head.textures["atlas"])
+    np.testing.assert_array_equal(glb.pixels(0), small_head.textures["atlas"])
+
+
+def test_every_photographed_expression_shows_its_texture_as_a_variant(small_head: Head) -> None:
+    sad = replace(small_head.expressions["joy"], texture="atlas")
+    head = replace(small_head, expressions=small_head.expressions | {"sad": sad})
+    glb = Glb(glb_bytes(head, image="PNG"))
+    extension = "KHR_materials_variants"
+    assert glb.json["extensionsUsed"] == [extension]
+    variants = [item["name"] for item in glb.json["extensions"][extension]["variants"]]
+    assert variants == ["neutral", "joy", "sad"]
+    for part in ("skin", "eyes"):
+        primitive = glb.primitive(part)
+        shown = {
+            variants[variant]: mapping["material"]
+            for mapping in primitive["extensions"][extension]["mappings"]
+            for variant in mapping["variants"]
+        }
+        assert glb.material_names[shown["joy"]] == f"{part}_joy"
+        assert shown["neutral"] == shown["sad"] == primitive["material"]
+        for name, texture in (("neutral", "atlas"), ("joy", "joy")):
+            np.testing.assert_array_equal(glb.pixels(shown[name]), small_head.textures[texture])
+
+
+def test_one_texture_makes_no_variants(small_head: Head) -> None:
+    joy = replace(small_head.expressions["joy"], texture="atlas")
+    glb = Glb(glb_bytes(replace(small_head, expressions=small_head.expressions | {"joy": joy})))
+    assert len(glb.json["images"]) == 1
+    assert not {"extensions", "extensionsUsed"} & set(glb.json)
+    assert "extensions" not in glb.primitives[0]
 
 
 def test_trimesh_opens_it(small_head: Head, tmp_path: Path) -> None:
@@ -176,7 +152,9 @@ def test_trimesh_opens_it(small_head: Head, tmp_path: Path) -> None:
 
 
 def test_parts_can_be_chosen(small_head: Head) -> None:
-    assert Glb(glb_bytes(small_head, parts=["left_eyeball"])).material_names == ["eyes"]
+    glb = Glb(glb_bytes(small_head, parts=["left_eyeball"]))
+    assert glb.material_names == ["eyes", "eyes_joy"]
+    assert len(glb.primitives) == 1
     with pytest.raises(InputError, match=r"part: expected skin or .* or hair, got nose"):
         glb_bytes(small_head, parts=["nose"])
     with pytest.raises(InputError, match="part: expected at least one that has triangles"):

@@ -44,6 +44,17 @@ class GlbBuffer:
         }
         return self._add(accessor | (_bounds(single) if bounds else {}))
 
+    def add_samples(self, samples: Float[Array, "*n_d"], *, bounds: bool = False) -> int:
+        """What an animation reads: numbers, vectors or quaternions; bounds are asked for times."""
+        single = np.ascontiguousarray(samples, dtype="<f4")
+        accessor = {
+            "bufferView": self.add_bytes(single.tobytes()),
+            "componentType": _COMPONENT["float32"],
+            "count": len(single),
+            "type": f"VEC{single.shape[1]}" if single.ndim == 2 else "SCALAR",
+        }
+        return self._add(accessor | (_bounds(single.reshape(len(single), -1)) if bounds else {}))
+
     def add_triangles(self, triangles: Int[Array, "f 3"]) -> int:
         """Vertex indices, as short as they can be."""
         indices = _compact(triangles.ravel(), smallest="uint16")

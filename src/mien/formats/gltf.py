@@ -1,4 +1,4 @@
-"""A head as binary glTF 2.0: metres, +Y up, +Z out of the face, face units as morph targets."""
+"""A head as binary glTF 2.0: metres, +Y up, +Z out of the face, expressions as morph targets."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import numpy as np
 from mien.arrays import Array, Int
 from mien.formats.atomic import atomic_file
 from mien.formats.glb import GlbBuffer, Json
-from mien.formats.image import encode_image
+from mien.formats.gltf_animation import GlbAnimation, animation_json
+from mien.formats.gltf_materials import material_json, material_of
 from mien.formats.surface import (
     ExportSurface,
     MaterialGroup,
@@ -19,10 +20,9 @@ from mien.formats.surface import (
     export_surface,
     split_at_seams,
 )
-from mien.model.head import ATLAS, Head
+from mien.model.head import Head
 
 _METRES_PER_MM = 0.001
-_LINEAR, _LINEAR_MIPMAP_LINEAR, _CLAMP_TO_EDGE = 9729, 9987, 33071
 
 
 def save_glb(
@@ -33,6 +33,7 @@ def save_glb(
     units: bool = True,
     lit: bool = True,
     image: Literal["JPEG", "PNG"] = "JPEG",
+    animation: GlbAnimation | None = None,
 ) -> None:
     """Write the head as one .glb, whole or not at all.
 
@@ -40,6 +41,7 @@ def save_glb(
     at texture seams. The face units and the photographed expressions are morph targets, named in
     `mesh.extras.targetNames`; their offsets are stored sparse. Targets carry no normals, which
     would double the file: Blender computes them anew, real-time viewers shade with neutral's.
+    Photographed expressions with a texture of their own are material variants.
 
     Args:
         parts: names of parts; by default all but the hair cap and the lashes.
@@ -47,10 +49,12 @@ def save_glb(
         lit: materials that the viewer's lights shade, which Blender opens as a Principled BSDF
             that can be worked on. False marks them unlit (KHR_materials_unlit): the texture as
             photographed, with the light that was there.
-        image: how the texture is stored; PNG is exact and several times as large.
-    Raises: InputError: an unknown part, a place that cannot be written.
+        image: how the textures are stored; PNG is exact and several times as large.
+        animation: how the head moves.
+    Raises: InputError: an unknown part, an animation of targets that the file has not, a place
+        that cannot be written.
     """
-    data = glb_bytes(head, parts=parts, units=units, lit=lit, image=image)
+    data = glb_bytes(head, parts=parts, units=units, lit=lit, image=image, animation=animation)
     with atomic_file(path) as temporary:
         temporary.write_bytes(data)
 
@@ -62,32 +66,31 @@ def glb_bytes(
     units: bool = True,
     lit: bool = True,
     image: Literal["JPEG", "PNG"] = "JPEG",
+    animation: GlbAnimation | None = None,
 ) -> bytes:
     """As save_glb, in memory."""
     surface = export_surface(head, parts=parts, units=units)
     buffer = GlbBuffer()
+    names = [target.name for target in surface.targets]
     mesh: Json = {
         "name": head.subject,
         "primitives": [
-            _primitive(buffer, surface, group) | {"material": index}
+            _primitive(buffer, surface, group) | material_of(surface, index)
             for index, group in enumerate(surface.groups)
         ],
     }
-    if surface.targets:
-        mesh["weights"] = [0.0] * len(surface.targets)
-        mesh["extras"] = {"targetNames": [target.name for target in surface.targets]}
+    if names:
+        mesh |= {"weights": [0.0] * len(names), "extras": {"targetNames": names}}
     document: Json = {
         "asset": {"version": "2.0", "generator": head.generator},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"name": head.subject, "mesh": 0}],
         "meshes": [mesh],
-        "materials": [_material(group, surface, lit=lit) for group in surface.groups],
     }
-    if not lit:
-        document["extensionsUsed"] = ["KHR_materials_unlit"]
-    if surface.texture is not None:
-        document |= _texture(buffer, encode_image(surface.texture, image), image)
+    document |= material_json(buffer, surface, lit=lit, image=image)
+    if animation is not None:
+        document["animations"] = [animation_json(buffer, animation, names, node=0)]
     return buffer.to_glb(document)
 
 
@@ -115,36 +118,3 @@ def _add_target(buffer: GlbBuffer, vertex: Int[Array, " n"], target: MorphTarget
     rows = np.flatnonzero(np.isin(vertex, target.vertices))
     offsets = target.offsets[np.searchsorted(target.vertices, vertex[rows])]
     return buffer.add_offsets(len(vertex), rows, _METRES_PER_MM * offsets)
-
-
-def _material(group: MaterialGroup, surface: ExportSurface, *, lit: bool) -> Json:
-    reflection: Json = {"metallicFactor": 0.0, "roughnessFactor": group.roughness}
-    if surface.texture is not None:
-        reflection["baseColorTexture"] = {"index": 0}
-    material: Json = {
-        "name": group.name,
-        "pbrMetallicRoughness": reflection,
-        # The surfaces are open at the neck, lips and lids, and their inside can come into view.
-        "doubleSided": True,
-    }
-    return material if lit else material | {"extensions": {"KHR_materials_unlit": {}}}
-
-
-def _texture(buffer: GlbBuffer, data: bytes, kind: str) -> Json:
-    """The one texture that all materials share."""
-    image = {
-        "name": ATLAS,
-        "bufferView": buffer.add_bytes(data),
-        "mimeType": f"image/{kind.lower()}",
-    }
-    sampler = {
-        "magFilter": _LINEAR,
-        "minFilter": _LINEAR_MIPMAP_LINEAR,
-        "wrapS": _CLAMP_TO_EDGE,
-        "wrapT": _CLAMP_TO_EDGE,
-    }
-    return {
-        "images": [image],
-        "samplers": [sampler],
-        "textures": [{"sampler": 0, "source": 0}],
-    }

@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int, UInt8
 from mien.errors import InputError
 from mien.mesh import Mesh
-from mien.model.head import ATLAS, NEUTRAL, Head
+from mien.model.head import NEUTRAL, Head
 from mien.render.shade import shown_parts
 
 # Parts that share a material; a part that is not listed has one of its own name.
@@ -61,14 +61,21 @@ class ExportSurface:
         groups: its triangles by material, in the order of the parts.
         normals: (V, 3) of length 1.
         targets: face units, then photographed expressions.
-        texture: the atlas, if there is one and the mesh has coordinates in it.
+        textures: by name, neutral's first; none where the mesh has no coordinates in them.
+        texture_of: which of them each photographed expression shows, neutral first.
     """
 
     mesh: Mesh
     groups: tuple[MaterialGroup, ...]
     normals: Float[Array, "v 3"]
     targets: tuple[MorphTarget, ...]
-    texture: UInt8[Array, "h w 3"] | None
+    textures: dict[str, UInt8[Array, "h w 3"]]
+    texture_of: dict[str, str]
+
+    @property
+    def texture(self) -> UInt8[Array, "h w 3"] | None:
+        """Neutral's."""
+        return next(iter(self.textures.values()), None)
 
 
 def export_surface(
@@ -89,6 +96,7 @@ def export_surface(
     mesh, kept = _compacted(head.mesh.submesh(triangles))
     materials = [_MATERIALS.get(name, name) for name in mesh.part_names]
     material = np.array(materials)[mesh.part]
+    texture_of = _texture_of(head) if len(mesh.uv_triangles) else {}
     return ExportSurface(
         mesh=mesh,
         groups=tuple(
@@ -98,7 +106,8 @@ def export_surface(
         ),
         normals=_unit_normals(mesh),
         targets=tuple(_targets(head, kept, units=units)),
-        texture=head.textures.get(ATLAS) if len(mesh.uv_triangles) else None,
+        textures={name: head.textures[name] for name in dict.fromkeys(texture_of.values())},
+        texture_of=texture_of,
     )
 
 
@@ -148,6 +157,17 @@ def _unit_normals(mesh: Mesh) -> Float[Array, "v 3"]:
     # Where all triangles around a vertex have no area any direction will do.
     normals[~normals.any(axis=1)] = (0.0, 0.0, 1.0)
     return normals
+
+
+def _texture_of(head: Head) -> dict[str, str]:
+    """Neutral first; an expression without a texture of its own shows neutral's."""
+    neutral = head.expressions[NEUTRAL].texture
+    if neutral not in head.textures:
+        return {}
+    textures = {NEUTRAL: neutral}
+    for name, expression in head.expressions.items():
+        textures[name] = expression.texture if expression.texture in head.textures else neutral
+    return textures
 
 
 def _targets(head: Head, kept: Int[Array, " v"], *, units: bool) -> list[MorphTarget]:
