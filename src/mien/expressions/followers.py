@@ -1,0 +1,53 @@
+"""Lashes and hair: parts that have no motion of their own and follow the skin next to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Float, Int, frozen
+from mien.assets.generic import GenericHead
+
+_PARTS = ("lashes", "hair")
+_NEIGHBOURS = 4
+_LEAST_MM = 0.2
+
+
+def part_vertices(generic: GenericHead, *parts: str) -> Int[Array, " p"]:
+    """The vertices of the named parts, ascending. Raises: InputError: no such part."""
+    found: Array = np.unique(generic.mesh.triangles[generic.mesh.triangles_of(*parts)])
+    return found
+
+
+@dataclass(frozen=True)
+class Followers:
+    """Which skin vertices carry each vertex of the lashes and the hair, and by how much.
+
+    Attributes:
+        vertices: (N,) the lashes' and the hair's vertices.
+        carriers: (N, 4) skin vertices nearest on the generic head.
+        weights: (N, 4) summing to 1.
+    """
+
+    vertices: Int[Array, " n"]
+    carriers: Int[Array, "n 4"]
+    weights: Float[Array, "n 4"]
+
+    @staticmethod
+    def of(generic: GenericHead) -> Followers:
+        """The followers of the generic topology."""
+        from scipy.spatial import cKDTree
+
+        vertices = part_vertices(generic, *_PARTS)
+        skin = part_vertices(generic, "skin")
+        places = generic.mesh.vertices
+        distance, nearest = cKDTree(places[skin]).query(places[vertices], k=_NEIGHBOURS)
+        weights = 1 / np.maximum(distance, _LEAST_MM) ** 2
+        weights /= weights.sum(axis=1, keepdims=True)
+        return Followers(frozen(vertices), frozen(skin[nearest]), frozen(weights))
+
+    def carried(self, offsets: Float[Array, "*k v 3"]) -> Float[Array, "*k n 3"]:
+        """(..., N, 3) what offsets of the skin add to the followers."""
+        moved: Array = (offsets[..., self.carriers, :] * self.weights[..., None]).sum(axis=-2)
+        return moved

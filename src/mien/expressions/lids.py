@@ -1,0 +1,206 @@
+"""Eyelids: they ride on the eyeballs, and upper and lower one meet without passing each other.
+
+A lid's place is told on the unit sphere that the eyeball is an image of: longitude from the inner
+to the outer eye corner, latitude across, and the radius.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Float, Int, frozen
+from mien.assets.generic import GenericHead
+from mien.expressions.gaze import SIDES, Eyeball
+from mien.expressions.margins import behind, distances_from, fading, full_path, skin_edges
+
+_CLEARANCE_MM = 0.4
+"""How far off the eyeball a lid stays that is further off at rest."""
+_OVERLAP_MM = 0.35
+"""How far a closed upper lid reaches over the lower one's edge: no crack between two polygons."""
+_IN_FRONT_MM = 0.15
+_REACH_MM = 14.0
+"""How far over the closed lid a correction of its edge fades out."""
+_BALL_MM = 9.0
+"""Skin further off the eyeball has nothing to do with it."""
+_ALLOWED = 1e-6
+_STEPS = (0.25, 0.5, 0.75, 1.0)
+
+
+@dataclass(frozen=True)
+class Lids:
+    """The lids of one eye of one head.
+
+    Attributes:
+        eyeball: where it is when the face is neutral.
+        vertices: (L,) the skin on and around the lids, the edges first: upper, then lower.
+        upper, lower: how many vertices the upper and the lower edge have, from the inner to the
+            outer corner, both of which are in both.
+        share: (L,) how far a correction of the upper edge goes along.
+        least: (L,) radius below which a vertex is in the eyeball; its own at rest if that is less;
+            0 on the back of the lids, which may be.
+        axes: (3, 3) rows: towards the middle of the lids, towards the outer corner, upwards.
+    """
+
+    eyeball: Eyeball
+    vertices: Int[Array, " l"]
+    upper: int
+    lower: int
+    share: Float[Array, " l"]
+    least: Float[Array, " l"]
+    axes: Float[Array, "3 3"]
+
+    @staticmethod
+    def of(generic: GenericHead, vertices: Float[Array, "v 3"], side: str) -> Lids:
+        """The left or the right eye's lids of a head with these neutral vertices, (V, 3) mm."""
+        eyeball = Eyeball.of(generic, vertices, side)
+        blink = generic.unit_offsets[generic.unit_names.index(f"eyeBlink{side.capitalize()}")]
+        edges = skin_edges(generic, generic.mesh.vertices)
+        upper, lower = (
+            full_path(edges, generic.polylines[f"{side}_{which}_eyelid"])
+            for which in ("upper", "lower")
+        )
+        closed = skin_edges(generic, generic.mesh.vertices + blink)
+        distance, nearest = distances_from(closed, np.concatenate([upper, lower[1:-1]]))
+        around = np.flatnonzero(distance < 2 * _REACH_MM)
+        off = np.linalg.norm(eyeball.on_sphere(vertices[around]), axis=1) - 1
+        around = around[(off < _BALL_MM / eyeball.radius) & (off > -0.5)]
+        inner = np.setdiff1d(around, np.concatenate([upper, lower]))
+        chosen = np.concatenate([upper, lower, inner])
+        share = fading(distance[chosen], _REACH_MM) * np.isin(nearest[chosen], upper)
+        axes = _axes(eyeball.on_sphere(vertices[upper[[0, -1]]]))
+        radius = np.linalg.norm(eyeball.on_sphere(vertices[chosen]), axis=1)
+        least = np.minimum(radius, 1 + _CLEARANCE_MM / eyeball.radius)
+        socket = np.flatnonzero(generic.regions["eye_socket"] > 0)
+        least[np.isin(chosen, behind(edges, np.concatenate([upper, lower]), socket))] = 0.0
+        return Lids(
+            eyeball, frozen(chosen), len(upper), len(lower), frozen(share), frozen(least), axes
+        )
+
+    def places(self, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
+        """(L, 3) longitude and latitude, radians, and radius of the lids on the unit sphere."""
+        points = self.eyeball.on_sphere(vertices[self.vertices]) @ self.axes.T
+        ahead, along, up = points.T
+        flat = np.hypot(ahead, along)
+        return np.column_stack([np.arctan2(along, ahead), np.arctan2(up, flat), np.hypot(flat, up)])
+
+    def at(self, places: Float[Array, "l 3"]) -> Float[Array, "l 3"]:
+        """(L, 3) mm: the inverse of places."""
+        longitude, latitude, radius = places.T
+        points = np.column_stack(
+            [
+                np.cos(latitude) * np.cos(longitude),
+                np.cos(latitude) * np.sin(longitude),
+                np.sin(latitude),
+            ]
+        )
+        inside = (radius[:, None] * points) @ self.axes
+        result: Array = inside @ self.eyeball.shape.T + self.eyeball.centre
+        return result
+
+    def overlap(self, places: Float[Array, "l 3"]) -> Float[Array, " u"]:
+        """(U,) radians by which the upper edge's vertices lie below the lower edge."""
+        upper, lower = self.edges(places)
+        found: Array = np.interp(upper[:, 0], _rising(lower[:, 0]), lower[:, 1]) - upper[:, 1]
+        return found
+
+    def edges(self, places: Float[Array, "l 3"]) -> tuple[Array, Array]:
+        """The upper and the lower edge's places, from the inner to the outer corner."""
+        return places[: self.upper], places[self.upper : self.upper + self.lower]
+
+    @property
+    def full_overlap(self) -> Float[Array, " u"]:
+        """(U,) radians: that of closed lids; none at the corners, where both are one."""
+        shape = np.sin(np.linspace(0, np.pi, self.upper)) ** 0.5
+        wanted: Array = _OVERLAP_MM / self.eyeball.radius * shape
+        return wanted
+
+    def spread(
+        self, places: Float[Array, "l 3"], corrections: Float[Array, " u"]
+    ) -> Float[Array, " l"]:
+        """(L,) what corrections of the upper edge's vertices are elsewhere on the lid."""
+        upper, _ = self.edges(places)
+        along: Array = np.interp(places[:, 0], _rising(upper[:, 0]), corrections) * self.share
+        return along
+
+
+def close_lids(
+    generic: GenericHead, vertices: Float[Array, "v 3"], units: Float[Array, "52 v 3"]
+) -> Float[Array, "52 v 3"]:
+    """The units with lids that close at eyeBlink 1 and never enter the eyeball.
+
+    Args:
+        vertices: (V, 3) mm, the neutral face.
+        units: (52, V, 3) mm, as transferred.
+    """
+    result = np.asarray(units, np.float64).copy()
+    for side in SIDES:
+        lids = Lids.of(generic, vertices, side)
+        rest = vertices[lids.vertices]
+        for unit, offsets in enumerate(result):
+            if not np.abs(offsets[lids.vertices]).max() > 0:
+                continue
+            if generic.unit_names[unit] == f"eyeBlink{side.capitalize()}":
+                offsets[lids.vertices] = _closed(lids, vertices + offsets) - rest
+            for weight in _STEPS:
+                posed = vertices + weight * offsets
+                places = lids.places(posed)
+                if (places[:, 2] < lids.least).any():
+                    offsets[lids.vertices] += _lift(lids, places) / weight
+    return result
+
+
+def _closed(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
+    """The lids with the upper edge laid along the lower one, just over and before it."""
+    places = lids.places(vertices)
+    places[:, 2] = np.maximum(places[:, 2], lids.least)
+    down = lids.overlap(places) - lids.full_overlap
+    places[:, 1] += lids.spread(places, down)
+    upper, lower = lids.edges(places)
+    wanted = np.interp(upper[:, 0], _rising(lower[:, 0]), lower[:, 2])
+    wanted += lids.full_overlap * (_IN_FRONT_MM / _OVERLAP_MM)
+    places[:, 2] += lids.spread(places, wanted - upper[:, 2])
+    return lids.at(places)
+
+
+def _lift(lids: Lids, places: Float[Array, "l 3"]) -> Float[Array, "l 3"]:
+    """(L, 3) mm out of the eyeball."""
+    lifted = places.copy()
+    lifted[:, 2] = np.maximum(places[:, 2], lids.least)
+    return lids.at(lifted) - lids.at(places)
+
+
+def _axes(corners: Float[Array, "2 3"]) -> Float[Array, "3 3"]:
+    """Rows: ahead between the corners, along towards the outer one, up; all at right angles."""
+    inner, outer = corners / np.linalg.norm(corners, axis=1, keepdims=True)
+    ahead = (inner + outer) / np.linalg.norm(inner + outer)
+    along = outer - (outer @ ahead) * ahead
+    along /= np.linalg.norm(along)
+    up = np.cross(along, ahead)
+    return np.array([ahead, along, up * np.sign(up[1])])
+
+
+def _rising(values: Float[Array, " n"]) -> Float[Array, " n"]:
+    """Nowhere falling, as interpolation wants it; edges double back by a hair at the corners."""
+    rising: Array = np.maximum.accumulate(values)
+    return rising
+
+
+def resolve_lids(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"] | None:
+    """(L, 3) mm that takes the lids out of each other and out of the eyeball; None: no contact.
+
+    The eyeball may have been carried elsewhere; it is taken to be where its vertices are.
+    """
+    shift = vertices[lids.eyeball.vertices].mean(axis=0) - lids.eyeball.centre
+    places = lids.places(vertices - shift) if shift.any() else lids.places(vertices)
+    too_far = lids.overlap(places) - lids.full_overlap
+    apart = bool((too_far < _ALLOWED).all())
+    if apart and not (places[:, 2] < lids.least - _ALLOWED).any():
+        return None
+    resolved = places.copy()
+    if not apart:
+        resolved[:, 1] += lids.spread(places, np.maximum(too_far, 0.0))
+    resolved[:, 2] = np.maximum(resolved[:, 2], lids.least)
+    moved: Array = lids.at(resolved) - lids.at(places)
+    return moved

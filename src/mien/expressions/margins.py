@@ -1,0 +1,65 @@
+"""The edges of lids and lips as unbroken paths of mesh edges, and distances from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+
+from mien.arrays import Array, Float, Int
+from mien.assets.generic import GenericHead
+
+
+def skin_edges(generic: GenericHead, vertices: Float[Array, "v 3"]) -> csr_matrix:
+    """(V, V) length of every edge of the skin, mm; symmetric."""
+    triangles = generic.mesh.triangles[generic.mesh.triangles_of("skin")]
+    pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    a, b = np.unique(pairs, axis=0).T
+    length = np.linalg.norm(vertices[a] - vertices[b], axis=1)
+    place = (np.concatenate([a, b]), np.concatenate([b, a]))
+    return coo_matrix((np.concatenate([length, length]), place), (len(vertices),) * 2).tocsr()
+
+
+def full_path(edges: csr_matrix, corners: Sequence[int]) -> Int[Array, " n"]:
+    """All vertices along the shortest way over the mesh through these corners, in their order."""
+    from scipy.sparse.csgraph import dijkstra
+
+    path = [corners[0]]
+    _, before = dijkstra(edges, indices=list(corners[:-1]), return_predecessors=True)
+    for row, end in enumerate(corners[1:]):
+        leg = [end]
+        while leg[-1] != corners[row]:
+            leg.append(int(before[row, leg[-1]]))
+        path += leg[-2::-1]
+    return np.array(path)
+
+
+def distances_from(
+    edges: csr_matrix, sources: Int[Array, " n"]
+) -> tuple[Float[Array, " v"], Int[Array, " v"]]:
+    """(V,) way over the mesh to the nearest source, mm, infinite where there is none; (V,) it."""
+    from scipy.sparse.csgraph import dijkstra
+
+    distance, _, nearest = dijkstra(edges, indices=sources, min_only=True, return_predecessors=True)
+    return distance, nearest
+
+
+def fading(distance: Float[Array, " n"], reach: float) -> Float[Array, " n"]:
+    """1 at distance 0, 0 from `reach` on, with no kink at either end."""
+    share = np.clip(distance / reach, 0.0, 1.0)
+    faded: Array = 0.5 + 0.5 * np.cos(np.pi * share)
+    return faded
+
+
+def behind(
+    edges: csr_matrix, margin: Int[Array, " n"], inside: Int[Array, " m"]
+) -> Int[Array, " v"]:
+    """Vertices that one reaches from `inside` without crossing the margin, itself not counted."""
+    from scipy.sparse.csgraph import connected_components
+
+    kept = np.setdiff1d(np.arange(edges.shape[0]), margin)
+    _, label = connected_components(edges[kept][:, kept], directed=False)
+    wanted = label[np.isin(kept, inside)]
+    reached: Array = kept[np.isin(label, wanted)]
+    return reached
