@@ -69,7 +69,8 @@ def glb_bytes(
     animation: GlbAnimation | None = None,
 ) -> bytes:
     """As save_glb, in memory."""
-    surface = export_surface(head, parts=parts, units=units)
+    shapes = animation.shapes if animation is not None else None
+    surface = export_surface(head, parts=parts, units=units, shapes=shapes)
     buffer = GlbBuffer()
     names = [target.name for target in surface.targets]
     mesh: Json = {

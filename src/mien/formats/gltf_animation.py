@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -26,6 +26,8 @@ class GlbAnimation:
         rotations: (T, 3, 3) and
         translations_mm: (T, 3) take head space to the scene's: x_scene = R x_head + t; None where
             the head neither turns nor moves.
+        shapes: morph targets that the file gets for this animation: (V, 3) mm over the head's
+            vertices, by name.
         interpolation: what happens between the times.
         name: what players list it as.
     Raises: InputError: shapes that do not fit, NaN, no time, time that stands or runs backwards,
@@ -37,6 +39,7 @@ class GlbAnimation:
     weights: Float[Array, "t n"] | None = None
     rotations: Float[Array, "t 3 3"] | None = None
     translations_mm: Float[Array, "t 3"] | None = None
+    shapes: Mapping[str, Float[Array, "v 3"]] = field(default_factory=dict)
     interpolation: Literal["LINEAR", "STEP"] = "LINEAR"
     name: str = "animation"
 

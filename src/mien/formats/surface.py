@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from mien.arrays import Array, Float, Int, UInt8
+from mien.arrays import Array, Float, Int, UInt8, check_array
 from mien.errors import InputError
 from mien.mesh import Mesh
 from mien.model.head import NEUTRAL, Head
@@ -79,18 +79,28 @@ class ExportSurface:
 
 
 def export_surface(
-    head: Head, *, parts: Iterable[str] | None = None, units: bool = True
+    head: Head,
+    *,
+    parts: Iterable[str] | None = None,
+    units: bool = True,
+    shapes: Mapping[str, Float[Array, "v 3"]] | None = None,
 ) -> ExportSurface:
     """What to write of a head.
 
-    Triangles that touch a vertex twice are left out. An expression that has a unit's name is
-    called NAME_photo.
+    Triangles that touch a vertex twice are left out.
 
     Args:
         parts: names; by default those that pictures show, all but the hair cap and the lashes.
         units: with the face units.
-    Raises: InputError: an unknown part, nothing left to export.
+        shapes: further morph targets: mm over the head's vertices.
+    Raises: InputError: an unknown part, nothing left to export, a further target with the name or
+        without the shape of the others.
     """
+    offsets = target_offsets(head, units=units)
+    for name, shape in (shapes or {}).items():
+        if name in offsets:
+            raise InputError("shapes", "names that no other target has", name)
+        offsets[name] = check_array(f"shape {name}", shape, head.mesh.vertices.shape)
     chosen = shown_parts(head.mesh) if parts is None else tuple(parts)
     triangles = _whole_triangles(head.mesh, chosen)
     mesh, kept = _compacted(head.mesh.submesh(triangles))
@@ -105,10 +115,24 @@ def export_surface(
             if (material == name).any()
         ),
         normals=_unit_normals(mesh),
-        targets=tuple(_targets(head, kept, units=units)),
+        targets=tuple(_target(name, all_[kept]) for name, all_ in offsets.items()),
         textures={name: head.textures[name] for name in dict.fromkeys(texture_of.values())},
         texture_of=texture_of,
     )
+
+
+def target_offsets(head: Head, *, units: bool = True) -> dict[str, Float[Array, "v 3"]]:
+    """(V, 3) mm of each morph target: the face units, then the photographed expressions."""
+    offsets = dict(zip(head.unit_names, head.units, strict=True)) if units else {}
+    for name, expression in head.expressions.items():
+        if name != NEUTRAL:
+            offsets[expression_target(head, name)] = expression.vertices - head.mesh.vertices
+    return offsets
+
+
+def expression_target(head: Head, expression: str) -> str:
+    """The name of an expression's morph target: its own, or NAME_photo where a unit has that."""
+    return f"{expression}_photo" if expression in head.unit_names else expression
 
 
 def split_at_seams(
@@ -168,15 +192,6 @@ def _texture_of(head: Head) -> dict[str, str]:
     for name, expression in head.expressions.items():
         textures[name] = expression.texture if expression.texture in head.textures else neutral
     return textures
-
-
-def _targets(head: Head, kept: Int[Array, " v"], *, units: bool) -> list[MorphTarget]:
-    offsets = dict(zip(head.unit_names, head.units, strict=True)) if units else {}
-    for name, expression in head.expressions.items():
-        if name != NEUTRAL:
-            free = f"{name}_photo" if name in offsets else name
-            offsets[free] = expression.vertices - head.mesh.vertices
-    return [_target(name, all_offsets[kept]) for name, all_offsets in offsets.items()]
 
 
 def _target(name: str, offsets: Float[Array, "v 3"]) -> MorphTarget:
