@@ -1,0 +1,70 @@
+"""The names of everything that a timeline moves, and what a set of values of them means."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from mien.arrays import Array, Float
+from mien.errors import InputError
+from mien.expressions.state import FaceState, Gaze
+
+HEAD, GAZE, UNITS = "head", "gaze", "units"
+"""Groups of channels besides the regions. A channel's name is GROUP.NAME: `units.jawOpen`."""
+
+MEMBERS = {HEAD: ("yaw", "pitch", "roll", "x", "y", "z"), GAZE: ("yaw", "pitch")}
+ANGLES = frozenset(f"{group}.{name}" for group in MEMBERS for name in ("yaw", "pitch", "roll"))
+
+REGIONS = (
+    "face",
+    *(side + part for part in ("mouth", "eyes", "forehead") for side in ("", "left_", "right_")),
+)
+"""Where weights of photographed expressions can hold. `left_eyes` is the left eye's region."""
+
+
+def split(channel: str) -> tuple[str, str]:
+    """`mouth.joy` to ("mouth", "joy"). Raises: InputError: not GROUP.NAME."""
+    group, _, name = channel.partition(".")
+    if not (group and name) or name not in MEMBERS.get(group, (name,)):
+        raise InputError("channel", "GROUP.NAME as units.jawOpen, mouth.joy or head.yaw", channel)
+    return group, name
+
+
+def to_state(values: Mapping[str, float]) -> FaceState:
+    """The face that these values by channel describe; what they leave out is at rest."""
+    units: dict[str, float] = {}
+    expressions: dict[str, dict[str, float]] = {}
+    for channel, value in values.items():
+        group, name = split(channel)
+        if group == UNITS:
+            units[name] = float(value)
+        elif group not in MEMBERS:
+            expressions.setdefault(group, {})[name] = float(value)
+    gaze = Gaze(float(values.get("gaze.yaw", 0)), float(values.get("gaze.pitch", 0)))
+    return FaceState(expressions, units, gaze)
+
+
+def head_rotation(yaw: float, pitch: float, roll: float) -> Float[Array, "3 3"]:
+    """Rotation of head space as `mien render` composes it: yaw first, then pitch, then roll.
+
+    Args:
+        yaw, pitch, roll: radians; to the subject's left, down, to the subject's right shoulder.
+    """
+    from scipy.spatial.transform import Rotation
+
+    # Lower-case axes are fixed ones, turned about in the order of their letters.
+    matrix: Array = Rotation.from_euler("yxz", [yaw, pitch, roll]).as_matrix()
+    return matrix
+
+
+def head_angles(rotation: Float[Array, "3 3"], *, order: str = "yxz") -> tuple[float, float, float]:
+    """The yaw, pitch and roll that make this rotation; pitch (in `order`'s middle) within pi / 2.
+
+    Args:
+        rotation: of head space.
+        order: "yxz" for head_rotation's own; "YXZ" where yaw turns the head that pitch has tipped
+            already, as a neck does and as most other programs count.
+    """
+    from scipy.spatial.transform import Rotation
+
+    yaw, pitch, roll = Rotation.from_matrix(rotation).as_euler(order)
+    return float(yaw), float(pitch), float(roll)

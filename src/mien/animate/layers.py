@@ -1,0 +1,117 @@
+"""Motions that make themselves: blinking and breathing, the same for the same seed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.animate.curves import Curve
+from mien.arrays import Array, check_array, check_positive
+from mien.errors import InputError
+
+
+@dataclass(frozen=True)
+class Blink:
+    """Both eyes blink now and then.
+
+    Attributes:
+        period: seconds from one blink to the next, on average.
+        jitter: share of the period by which each blink comes earlier or later, 0 to 0.9.
+        closing, closed, opening: seconds that the lids take to fall, stay and rise.
+        amount: how far they fall; 1 closes them.
+        seed: another one gives other times.
+    Raises: InputError: a duration of 0 or less, blinks that would overlap, a jitter out of range.
+    """
+
+    period: float = 4.0
+    jitter: float = 0.4
+    closing: float = 0.07
+    closed: float = 0.04
+    opening: float = 0.16
+    amount: float = 1.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("period", "closing", "closed", "opening"):
+            check_positive(name, getattr(self, name))
+        check_array("amount", self.amount, ())
+        _check_share("jitter", self.jitter)
+        length = self.closing + self.closed + self.opening
+        if length >= (shortest := self.period * (1 - self.jitter)):
+            expected = f"blinks shorter than the pause between them ({shortest:g} s at least)"
+            raise InputError("period", expected, f"blinks of {length:g} s")
+
+    def channels(self, duration: float) -> Mapping[str, Curve]:
+        """Curves for the lids of both eyes over this many seconds."""
+        rng = np.random.default_rng(self.seed)
+        # The first comes within the first period, so that a short clip blinks too.
+        starts = self.period * rng.uniform(0.2, 0.8) + _events(
+            rng, duration, self.period, self.jitter
+        )
+        steps = np.cumsum([0.0, self.closing, self.closed, self.opening])
+        times = (starts[:, None] + steps).ravel()
+        values = np.tile([0.0, self.amount, self.amount, 0.0], len(starts))
+        curve = Curve(times, values)
+        return {"units.eyeBlinkLeft": curve, "units.eyeBlinkRight": curve}
+
+
+@dataclass(frozen=True)
+class Breathing:
+    """The head rises and falls a little, and never stands quite still.
+
+    Attributes:
+        period: seconds a breath. jitter: share by which breaths differ in length.
+        rise: mm by which breathing in lifts the head. tip: radians by which it tips it back.
+        sway: radians of slow turning and leaning, slower than the breath.
+        seed: another one gives another motion.
+    Raises: InputError: a period of 0 or less, a jitter out of range, NaN.
+    """
+
+    period: float = 4.2
+    jitter: float = 0.15
+    rise: float = 1.2
+    tip: float = float(np.radians(0.35))
+    sway: float = float(np.radians(0.6))
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_positive("period", self.period)
+        _check_share("jitter", self.jitter)
+        check_array("rise, tip and sway", (self.rise, self.tip, self.sway), (3,))
+
+    def channels(self, duration: float) -> Mapping[str, Curve]:
+        """Curves for the head's height, pitch, yaw and roll over this many seconds."""
+        rng = np.random.default_rng(self.seed)
+        starts = _events(rng, duration, self.period, self.jitter)
+        # In less than two fifths of a breath the air comes in; it goes out more slowly.
+        times = (starts[:, None] + [0.0, 0.4 * self.period * (1 - self.jitter)]).ravel()
+        depths = rng.uniform(0.8, 1.0, len(starts))
+        full = np.column_stack([np.zeros(len(starts)), depths]).ravel()
+        lag = 0.12 * self.period
+        drift_times = _events(rng, duration, 1.6 * self.period, 0.5)
+        yaw, roll = self.sway * rng.uniform(-1, 1, (2, len(drift_times)))
+        return {
+            "head.y": Curve(times, self.rise * full),
+            "head.pitch": Curve(times + lag, -self.tip * full),
+            "head.yaw": Curve(drift_times, yaw),
+            "head.roll": Curve(drift_times, 0.5 * roll),
+        }
+
+
+Generator = Blink | Breathing
+GENERATORS: Mapping[str, type[Blink] | type[Breathing]] = {"blink": Blink, "breathing": Breathing}
+
+
+def _events(rng: np.random.Generator, duration: float, period: float, jitter: float) -> Array:
+    """(E,) rising times from 0 until past the duration, at least two."""
+    count = int(duration / (period * (1 - jitter))) + 3
+    gaps = period * (1 + jitter * rng.uniform(-1, 1, count))
+    starts: Array = np.append(0.0, np.cumsum(gaps))
+    return starts[: max(2, int(np.searchsorted(starts, duration)) + 1)]
+
+
+def _check_share(name: str, share: float) -> None:
+    if not 0 <= share <= 0.9:
+        raise InputError(name, "a share from 0 to 0.9", share)

@@ -1,0 +1,41 @@
+"""A timeline frame by frame, and the camera that sees the head move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from mien.animate.timeline import Moment, Timeline
+from mien.arrays import Array, Float, check_positive
+from mien.camera import Camera
+
+
+def frames_of(timeline: Timeline, fps: float | None = None) -> Float[Array, " n"]:
+    """(N,) seconds of the frames: from 0, one every 1 / fps, as many as fill the duration.
+
+    Args:
+        fps: frames a second; the timeline's own unless given.
+    """
+    rate = check_positive("fps", timeline.fps if fps is None else fps)
+    times: Array = np.arange(max(1, round(timeline.duration * rate))) / rate
+    return times
+
+
+def moments(timeline: Timeline, fps: float | None = None) -> Iterator[Moment]:
+    """Face and head at every frame."""
+    return timeline.moments_at(frames_of(timeline, fps))
+
+
+def moved_camera(camera: Camera, moment: Moment) -> Camera:
+    """The camera that sees the head at rest as `camera` sees the moved head.
+
+    Args:
+        camera: sees head space; the head moves in it.
+    """
+    return replace(
+        camera,
+        R_cam_head=camera.R_cam_head @ moment.rotation,
+        t_cam_head=camera.R_cam_head @ moment.translation + camera.t_cam_head,
+    )

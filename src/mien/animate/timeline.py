@@ -1,0 +1,216 @@
+"""What a face and its head do over time: tracks, layers on top of them, clips used again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mien.animate import channels
+from mien.animate.curves import Curve, constant
+from mien.animate.layers import Generator
+from mien.arrays import Array, Float, check_array, check_positive, frozen
+from mien.errors import InputError
+from mien.expressions.state import FaceState
+
+PIVOT_MM = (0.0, -60.0, -80.0)
+"""Head space: the top of the neck, where a skull nods and turns."""
+
+MAX_PLAYS, MAX_DEPTH = 10_000, 32
+"""Clips inside of clips multiply; a document of a few lines could ask for years of work."""
+
+Tracks = Mapping[str, Curve]
+"""Curves by channel (`units.jawOpen`, `mouth.joy`, `head.yaw`, `gaze.pitch`); radians and mm."""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A clip at a place in time.
+
+    Attributes:
+        clip: its name. at: seconds where it starts.
+        speed: 2 plays it in half the time. weight: factor on its values.
+        repeats: how often it plays, one after the other; may be a fraction.
+    Raises: InputError: a speed or a number of repeats of 0 or less, NaN.
+    """
+
+    clip: str
+    at: float
+    speed: float = 1.0
+    weight: float = 1.0
+    repeats: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_positive("speed", self.speed)
+        check_positive("repeats", self.repeats)
+        check_array("at and weight", (self.at, self.weight), (2,))
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A motion with a name, to be placed as often as one likes; nothing outside of its length.
+
+    Attributes:
+        duration: seconds. tracks: from 0 to there. placements: of other clips in this one.
+    """
+
+    duration: float
+    tracks: Tracks = field(default_factory=dict)
+    placements: tuple[Placement, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_positive("duration", self.duration)
+        _check_channels(self.tracks)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Motion that is added to everything below it.
+
+    Attributes:
+        name: for people. weight: factor on the layer, over time.
+        tracks, placements: as a timeline's. generator: makes further tracks.
+    """
+
+    name: str = ""
+    weight: Curve = field(default_factory=lambda: constant(1.0))
+    tracks: Tracks = field(default_factory=dict)
+    placements: tuple[Placement, ...] = ()
+    generator: Generator | None = None
+
+    def __post_init__(self) -> None:
+        _check_channels(self.tracks)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Face and head at one time: a vertex x in head space is seen at rotation x + translation.
+
+    Attributes:
+        time: seconds. state: what the face does.
+        rotation: (3, 3). translation: (3,) mm; the pivot's part is in it.
+    """
+
+    time: float
+    state: FaceState
+    rotation: Float[Array, "3 3"]
+    translation: Float[Array, " 3"]
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """A performance: tracks + placed clips + layers, added channel by channel.
+
+    Attributes:
+        duration: seconds. fps: frames a second that it was made for.
+        size: width and height in px of its pictures, where it says so.
+        pivot: (3,) mm, head space: the point about which the head turns.
+        tracks: by channel; one that is not there is at 0.
+        placements: of clips, added to the tracks. clips: by name.
+        layers: added on top.
+    Raises: InputError: a duration, rate or size of 0 or less, an unknown clip, one that contains
+        itself, a channel that is none.
+    """
+
+    duration: float
+    fps: float = 30.0
+    size: tuple[int, int] | None = None
+    pivot: Float[Array, " 3"] = field(default_factory=lambda: np.array(PIVOT_MM))
+    tracks: Tracks = field(default_factory=dict)
+    placements: tuple[Placement, ...] = ()
+    clips: Mapping[str, Clip] = field(default_factory=dict)
+    layers: tuple[Layer, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_positive("duration", self.duration)
+        check_positive("fps", self.fps)
+        for length in self.size or ():
+            check_positive("size", length)
+        object.__setattr__(self, "pivot", frozen(check_array("pivot", self.pivot, (3,))))
+        _check_channels(self.tracks)
+        _check_placements(self)
+
+    def sample(self, times: Float[Array, " n"]) -> dict[str, Float[Array, " n"]]:
+        """(N,) values at these times in seconds, by channel; radians and mm."""
+        times = check_array("times", times, (None,))
+        total: dict[str, Array] = {}
+        _add(total, self.tracks, times, np.ones_like(times))
+        self._add_clips(total, self.placements, times, np.ones_like(times))
+        for layer in self.layers:
+            weight = layer.weight.at(times)
+            _add(total, layer.tracks, times, weight)
+            self._add_clips(total, layer.placements, times, weight)
+            if layer.generator is not None:
+                _add(total, layer.generator.channels(self.duration), times, weight)
+        return total
+
+    def at(self, time: float) -> Moment:
+        """Face and head at a time in seconds."""
+        return next(self.moments_at(np.array([time])))
+
+    def moments_at(self, times: Float[Array, " n"]) -> Iterator[Moment]:
+        """Face and head at these times in seconds, one after the other."""
+        values = self.sample(times)
+        for index, time in enumerate(times):
+            yield self._moment(float(time), {name: row[index] for name, row in values.items()})
+
+    def _moment(self, time: float, values: Mapping[str, float]) -> Moment:
+        pose = [float(values.get(f"head.{name}", 0.0)) for name in channels.MEMBERS[channels.HEAD]]
+        rotation = channels.head_rotation(pose[0], pose[1], pose[2])
+        translation = self.pivot - rotation @ self.pivot + pose[3:]
+        return Moment(time, channels.to_state(values), rotation, translation)
+
+    def _add_clips(
+        self,
+        total: dict[str, Array],
+        placements: tuple[Placement, ...],
+        times: Array,
+        weight: Array,
+    ) -> None:
+        for placement in placements:
+            clip = self.clips[placement.clip]
+            played = (times - placement.at) * placement.speed
+            # Half open, so that a clip that follows at once does not sound at the same time.
+            inside = (played >= 0) & (played < placement.repeats * clip.duration)
+            here = weight * placement.weight * inside
+            within = np.mod(played, clip.duration)
+            _add(total, clip.tracks, within, here)
+            self._add_clips(total, clip.placements, within, here)
+
+
+def _add(total: dict[str, Array], tracks: Tracks, times: Array, weight: Array) -> None:
+    for channel, curve in tracks.items():
+        total[channel] = total.get(channel, 0.0) + weight * curve.at(times)
+
+
+def _check_channels(tracks: Tracks) -> None:
+    for channel in tracks:
+        channels.split(channel)
+
+
+def _check_placements(timeline: Timeline) -> None:
+    counts: dict[str, int] = {}
+    for name in timeline.clips:
+        _count_plays(timeline.clips, name, (), counts)
+    for placement in (*timeline.placements, *(p for a in timeline.layers for p in a.placements)):
+        _count_plays(timeline.clips, placement.clip, (), counts)
+
+
+def _count_plays(
+    clips: Mapping[str, Clip], name: str, above: tuple[str, ...], counts: dict[str, int]
+) -> int:
+    """How many curves' sets one play of a clip evaluates, clips inside of clips counted."""
+    if name not in clips:
+        raise InputError("clip", f"one of {', '.join(clips) or 'no clips at all'}", name)
+    if name in above:
+        chain = " > ".join((*above[above.index(name) :], name))
+        raise InputError(f"clips.{name}", "a clip that does not contain itself", chain)
+    if len(above) >= MAX_DEPTH:
+        raise InputError(f"clips.{name}", f"clips nested at most {MAX_DEPTH} deep", "deeper ones")
+    if name not in counts:
+        inner = (p.clip for p in clips[name].placements)
+        counts[name] = 1 + sum(_count_plays(clips, n, (*above, name), counts) for n in inner)
+    if counts[name] > MAX_PLAYS:
+        raise InputError(f"clips.{name}", f"at most {MAX_PLAYS} plays inside", counts[name])
+    return counts[name]
