@@ -104,7 +104,7 @@ def check_triangles(triangles: object, vertices: int) -> Int[Array, "f 3"]:
 
 
 @njit(cache=True, nogil=True)
-def _edge(vertices_px: Array, i: int, j: int) -> tuple[float, float, float, float, bool]:
+def edge_line(vertices_px: Array, i: int, j: int) -> tuple[float, float, float, float, bool]:
     """The line i-j as a (x - x0) + b (y - y0), positive inside; whether a point on it is inside.
 
     Inside is to the right when walking from i to j with y pointing down. Both triangles at an
@@ -125,7 +125,9 @@ def _inside(a: float, x0: float, rest: float, closed: bool, col: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _clip(a: float, x0: float, rest: float, closed: bool, left: int, right: int) -> tuple[int, int]:
+def clip_columns(
+    a: float, x0: float, rest: float, closed: bool, left: int, right: int
+) -> tuple[int, int]:
     """Of the columns from left to right, the first and the last inside an edge."""
     if a == 0.0:
         return (left, right) if _inside(a, x0, rest, closed, left) else (left, left - 1)
@@ -162,17 +164,17 @@ def _fill_triangle(
     """
     second, third = (2, 1) if flip else (1, 2)
     i, j, k = triangles[t, 0], triangles[t, second], triangles[t, third]
-    a0, b0, x0, y0, closed0 = _edge(vertices_px, j, k)
-    a1, b1, x1, y1, closed1 = _edge(vertices_px, k, i)
-    a2, b2, x2, y2, closed2 = _edge(vertices_px, i, j)
+    a0, b0, x0, y0, closed0 = edge_line(vertices_px, j, k)
+    a1, b1, x1, y1, closed1 = edge_line(vertices_px, k, i)
+    a2, b2, x2, y2, closed2 = edge_line(vertices_px, i, j)
     wi, wj, wk = 1.0 / depth[i], 1.0 / depth[j], 1.0 / depth[k]
     top, bottom, box_left, box_right = box
     for row in range(top, bottom + 1):
         y = row + 0.5
         r0, r1, r2 = b0 * (y - y0), b1 * (y - y1), b2 * (y - y2)
-        left, right = _clip(a0, x0, r0, closed0, box_left, box_right)
-        left, right = _clip(a1, x1, r1, closed1, left, right)
-        left, right = _clip(a2, x2, r2, closed2, left, right)
+        left, right = clip_columns(a0, x0, r0, closed0, box_left, box_right)
+        left, right = clip_columns(a1, x1, r1, closed1, left, right)
+        left, right = clip_columns(a2, x2, r2, closed2, left, right)
         for col in range(left, right + 1):
             x = col + 0.5
             e0, e1, e2 = a0 * (x - x0) + r0, a1 * (x - x1) + r1, a2 * (x - x2) + r2

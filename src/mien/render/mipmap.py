@@ -2,54 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
-from mien.arrays import Array, Float, UInt8, frozen
+from mien.arrays import Array, Float, Int, UInt8, check_image, frozen
 from mien.errors import InputError
-from mien.mesh import Mesh
-from mien.numeric.raster import Raster
-from mien.numeric.threads import for_row_bands
+
+# A texel's three channels are weighted by one multiplication: each has 21 of 64 bits to itself, 8
+# for the colour and 13 for the weight.
+UNIT = 8192
 
 
-def sample_texture(
-    mesh: Mesh,
-    vertices_px: Float[Array, "v 2"],
-    raster: Raster,
-    texture: UInt8[Array, "h w 3"],
-) -> Float[Array, "h w 3"]:
-    """The texture's colours on every pixel, (H, W, 3) float32 from 0 to 255.
+class Pyramids(NamedTuple):
+    """Several textures of one size, each with all its levels.
 
-    Trilinear: bilinear in the two levels of the texture's pyramid that come nearest to one texel
-    a pixel. u goes around, v ends at the image's edge.
-    Raises: InputError: a mesh without texture coordinates.
+    Attributes:
+        texels: (K, N) uint32, red in the lowest byte; level after level, row after row.
+        widths, heights, starts: (L,) each level's size and its first texel.
     """
-    if len(mesh.uv_triangles) == 0:
-        raise InputError("mesh", "one with texture coordinates", "one without")
-    levels = _pyramid(texture)
-    flat = np.concatenate([level.reshape(-1, 3) for level in levels])
-    sizes = np.array([level.shape[:2] for level in levels], np.int64)
-    starts = np.cumsum([0, *(level.shape[0] * level.shape[1] for level in levels[:-1])])
-    detail = _level_of_detail(mesh, vertices_px, texture.shape[1], texture.shape[0])
-    arrays = (
-        raster.triangle_ids,
-        raster.barycentrics,
-        mesh.triangles,
-        mesh.uv_triangles,
-        mesh.uvs,
-        detail,
-        flat,
-        sizes,
-        starts,
-    )
-    inputs = [frozen(np.ascontiguousarray(array)) for array in arrays]
-    height, width = raster.triangle_ids.shape
-    out = np.zeros((height, width, 3), np.float32)
-    for_row_bands(lambda a, b: _texture_rows(*inputs, a, b, out), height, work=width * height)
-    return out
+
+    texels: Int[Array, "k n"]
+    widths: Int[Array, " l"]
+    heights: Int[Array, " l"]
+    starts: Int[Array, " l"]
 
 
-def _pyramid(texture: Array) -> list[Array]:
+def build_pyramids(textures: Sequence[UInt8[Array, "h w 3"]]) -> Pyramids:
+    """Pyramids of textures of one size. Raises: InputError: none, no images, sizes that differ."""
+    if not len(textures):
+        raise InputError("textures", "at least one", "none")
+    rows: list[Array] = []
+    sizes: list[tuple[int, int]] = []
+    for index, texture in enumerate(textures):
+        levels = _halved(check_image(f"texture {index}", texture))
+        found = [(level.shape[0], level.shape[1]) for level in levels]
+        sizes = sizes or found
+        if found != sizes:
+            expected = f"{sizes[0][1]}x{sizes[0][0]} px as texture 0 has"
+            raise InputError(f"texture {index}", expected, f"{found[0][1]}x{found[0][0]}")
+        rows.append(np.concatenate([_packed(level) for level in levels]))
+    heights, widths = np.array(sizes, np.int64).T.copy()
+    starts = np.concatenate([[0], np.cumsum(widths * heights)[:-1]])
+    return Pyramids(frozen(np.stack(rows)), frozen(widths), frozen(heights), frozen(starts))
+
+
+def _halved(texture: Array) -> list[Array]:
     import cv2
 
     levels = [texture]
@@ -59,77 +59,120 @@ def _pyramid(texture: Array) -> list[Array]:
     return levels
 
 
-def _level_of_detail(mesh: Mesh, vertices_px: Array, width: int, height: int) -> Float[Array, " v"]:
-    """(V,) float32: log2 of the texels along a pixel's side, from the areas of the triangles."""
-    texels = _areas(mesh.uvs * [width, height], mesh.uv_triangles)
-    pixels = _areas(np.nan_to_num(vertices_px), mesh.triangles)
-    # Sums over the triangles around a vertex: it changes smoothly over the head.
-    corners = mesh.triangles.ravel()
-    count = len(mesh.vertices)
-    texels, pixels = (
-        np.bincount(corners, np.repeat(area, 3), minlength=count) for area in (texels, pixels)
-    )
-    ratio = np.maximum(texels, 1e-9) / np.maximum(pixels, 1e-9)
-    detail: Array = (0.5 * np.log2(ratio)).astype(np.float32)
+def _packed(level: Array) -> Int[Array, " n"]:
+    import cv2
+
+    packed: Array = cv2.cvtColor(np.ascontiguousarray(level), cv2.COLOR_RGB2RGBA)
+    return packed.view(np.uint32).ravel()
+
+
+def texel_areas(uvs: Float[Array, "f 3 2"], pyramids: Pyramids) -> Float[Array, " f"]:
+    """(F,) how many texels of the finest level the triangles with these corners cover."""
+    corners = uvs * [pyramids.widths[0], pyramids.heights[0]]
+    b, c = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    areas: Array = np.abs(b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]) / 2
+    return areas
+
+
+def level_of_detail(
+    texels: Float[Array, " f"], points: Float[Array, "v 2"], triangles: Int[Array, "f 3"]
+) -> Float[Array, " v"]:
+    """(V,) log2 of the texels along a sample's side, from the areas of the triangles around.
+
+    Args:
+        texels: (F,) of texel_areas. points: (V, 2) samples' widths.
+    """
+    detail = np.empty(len(points), np.float32)
+    _level_of_detail(texels, points, triangles, detail)
     return detail
 
 
-def _areas(points: Array, triangles: Array) -> Float[Array, " f"]:
-    a, b, c = (points[triangles[:, corner]] for corner in range(3))
-    cross: Array = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    return np.abs(cross) / 2
+@njit(cache=True, nogil=True, error_model="numpy")
+def _level_of_detail(texels: Array, points: Array, triangles: Array, detail: Array) -> None:
+    # Sums over the triangles around a vertex: it changes smoothly over the head.
+    sums = np.full((len(points), 2), 1e-9)
+    for t in range(len(triangles)):
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        bx, by = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
+        cx, cy = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1]
+        area = abs(bx * cy - by * cx) / 2.0
+        for corner in range(3):
+            sums[triangles[t, corner], 0] += texels[t]
+            if area < np.inf:
+                sums[triangles[t, corner], 1] += area
+    for v in range(len(points)):
+        detail[v] = 0.5 * np.log2(sums[v, 0] / sums[v, 1])
 
 
-@njit(cache=True, nogil=True)
-def _add_level(
-    flat: Array, start: int, width: int, height: int, u: float, v: float, share: float, out: Array
-) -> None:
-    """Add share x one level's colour at (u, v) to out; v points down here, u goes around."""
-    x, y = u * width - 0.5, min(max(v * height - 0.5, 0.0), height - 1.0)
-    x0, y0 = int(np.floor(x)), int(y)
-    fx, fy = x - x0, y - y0
-    left, right = x0 % width, (x0 + 1) % width
-    above, below = start + y0 * width, start + min(y0 + 1, height - 1) * width
-    w00, w01 = share * (1.0 - fy) * (1.0 - fx), share * (1.0 - fy) * fx
-    w10, w11 = share * fy * (1.0 - fx), share * fy * fx
-    for c in range(3):
-        upper = w00 * flat[above + left, c] + w01 * flat[above + right, c]
-        out[c] += upper + w10 * flat[below + left, c] + w11 * flat[below + right, c]
+@njit(cache=True, nogil=True, error_model="numpy")
+def place_lookup(
+    pyramids: Pyramids, u: float, v: float, level: float, places: Array, weights: Array
+) -> int:
+    """Which texels make the colour at (u, v), the same ones in every texture.
+
+    Trilinear: bilinear in the two levels that come nearest to one texel a sample. u goes around,
+    v points up and ends at the image's edge.
+
+    Args:
+        places: (8,) int64 to fill. weights: (8,) uint64 to fill: shares of UNIT.
+    Returns: how many there are, 4 or 8.
+    """
+    last = len(pyramids.starts) - 1
+    level = min(max(level, 0.0), float(last))
+    fine = int(level)
+    coarse_share = int((level - fine) * UNIT + 0.5)
+    _place_in_level(pyramids, fine, u, v, UNIT - coarse_share, places, weights, 0)
+    if coarse_share == 0:
+        return 4
+    _place_in_level(pyramids, fine + 1, u, v, coarse_share, places, weights, 4)
+    return 8
 
 
-@njit(cache=True, nogil=True)
-def _texture_rows(
-    ids: Array,
-    barycentrics: Array,
-    triangles: Array,
-    uv_triangles: Array,
-    uvs: Array,
-    detail: Array,
-    flat: Array,
-    sizes: Array,
-    starts: Array,
+@njit(cache=True, nogil=True, error_model="numpy")
+def _place_in_level(
+    pyramids: Pyramids,
+    level: int,
+    u: float,
+    v: float,
+    share: int,
+    places: Array,
+    weights: Array,
     first: int,
-    end: int,
-    out: Array,
 ) -> None:
-    last = len(starts) - 1
-    for row in range(first, end):
-        for col in range(ids.shape[1]):
-            t = ids[row, col]
-            if t < 0:
-                continue
-            u, v, level = 0.0, 0.0, 0.0
-            for corner in range(3):
-                share = barycentrics[row, col, corner]
-                u += share * uvs[uv_triangles[t, corner], 0]
-                v += share * (1.0 - uvs[uv_triangles[t, corner], 1])
-                level += share * detail[triangles[t, corner]]
-            level = min(max(level, 0.0), float(last))
-            fine = int(level)
-            coarse, share = min(fine + 1, last), level - fine
-            pixel = out[row, col]
-            width, height = sizes[fine, 1], sizes[fine, 0]
-            _add_level(flat, starts[fine], width, height, u, v, 1.0 - share, pixel)
-            if share > 0.0:
-                width, height = sizes[coarse, 1], sizes[coarse, 0]
-                _add_level(flat, starts[coarse], width, height, u, v, share, pixel)
+    width, height = pyramids.widths[level], pyramids.heights[level]
+    start = pyramids.starts[level]
+    x = (u - np.floor(u)) * width - 0.5
+    y = min(max((1.0 - v) * height - 0.5, 0.0), height - 1.0)
+    x0, y0 = int(np.floor(x)), int(y)
+    left = x0 if x0 >= 0 else width - 1
+    right = x0 + 1 if x0 + 1 < width else 0
+    above, below = start + y0 * width, start + min(y0 + 1, height - 1) * width
+    places[first], places[first + 1] = above + left, above + right
+    places[first + 2], places[first + 3] = below + left, below + right
+    # Rounded so that they sum to the share: a plain texture keeps its colour.
+    lower = int(share * (y - y0) + 0.5)
+    upper_right = int((share - lower) * (x - x0) + 0.5)
+    lower_right = int(lower * (x - x0) + 0.5)
+    weights[first], weights[first + 1] = share - lower - upper_right, upper_right
+    weights[first + 2], weights[first + 3] = lower - lower_right, lower_right
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def weighted_texels(
+    texels: Array, texture: int, places: Array, weights: Array, count: int
+) -> tuple[float, float, float]:
+    """One texture's colour, from 0 to 255."""
+    total = np.uint64(0)
+    for n in range(count):
+        texel = np.uint64(texels[texture, places[n]])
+        spread = (
+            (texel & np.uint64(0xFF))
+            | ((texel & np.uint64(0xFF00)) << np.uint64(13))
+            | ((texel & np.uint64(0xFF0000)) << np.uint64(26))
+        )
+        total += weights[n] * spread
+    lane = np.uint64(0x1FFFFF)
+    red = np.int64(total & lane)
+    green = np.int64((total >> np.uint64(21)) & lane)
+    blue = np.int64(total >> np.uint64(42))
+    return red / UNIT, green / UNIT, blue / UNIT

@@ -8,7 +8,8 @@ from mien.arrays import Array, Float, Int, UInt8, check_array, check_image
 from mien.camera import Camera
 from mien.errors import InputError
 from mien.mesh import Mesh
-from mien.render.shade import project_safely, rasterize_mesh, shown_parts
+from mien.render.projection import project_safely
+from mien.render.shade import rasterize_mesh, shown_parts
 
 # OpenCV draws at fractions of a pixel given as integers with this many bits behind the point.
 _SHIFT = 4
@@ -37,7 +38,7 @@ def overlay_mesh(
         expected = f"{camera.width}x{camera.height} px as its camera says"
         raise InputError("photo", expected, f"{photo.shape[1]}x{photo.shape[0]}")
     shown = mesh.submesh(mesh.triangles_of(*(shown_parts(mesh) if parts is None else parts)))
-    ends = project_safely(shown, camera)[_visible_edges(shown, camera)]
+    ends = project_safely(shown.vertices, camera)[_visible_edges(shown, camera)]
     drawn = np.ascontiguousarray(photo)
     if drawn is photo:
         drawn = photo.copy()

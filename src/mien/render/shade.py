@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from mien.arrays import Array, Float, UInt8, check_array, check_image
+from mien.arrays import Array, Float, UInt8, check_array
 from mien.camera import Camera
 from mien.errors import InputError
 from mien.mesh import Mesh
 from mien.numeric.raster import Raster, interpolate, rasterize
-from mien.render.mipmap import sample_texture
-
-SAMPLES = (1, 4, 9)
+from mien.render.mipmap import build_pyramids
+from mien.render.mix import draw_mix, painted
+from mien.render.projection import enlarged, project_safely, samples_across
 
 
 @dataclass(frozen=True)
@@ -59,27 +59,43 @@ def render(
         background: a colour or an image; alpha is then 255 everywhere.
     Raises: InputError: shapes, a texture on a mesh without texture coordinates, unknown parts.
     """
-    if samples not in SAMPLES:
-        raise InputError("samples", " or ".join(map(str, SAMPLES)), samples)
+    factor = samples_across(samples)
     if texture is not None and vertex_colours is not None:
         raise InputError("vertex_colours", "only one of them and texture", "both")
-    factor = int(np.sqrt(samples))
-    large = _enlarged(camera, factor)
     shown = mesh.submesh(mesh.triangles_of(*(shown_parts(mesh) if parts is None else parts)))
-    raster = rasterize_mesh(shown, large)
     if texture is not None:
-        pixels = project_safely(shown, large)
-        colours = sample_texture(shown, pixels, raster, check_image("texture", texture))
-    elif vertex_colours is not None:
+        image = _textured(shown, camera, texture, light, factor)
+    else:
+        image = _coloured(shown, camera, vertex_colours, light, factor)
+    return image if background is None else over_background(image, background)
+
+
+def _textured(
+    mesh: Mesh, camera: Camera, texture: Array, light: Light | None, factor: int
+) -> UInt8[Array, "h w 4"]:
+    count = len(mesh.vertices)
+    brightness = np.ones(count)
+    if light is not None:
+        brightness = _brightness(mesh.vertex_normals() @ camera.R_cam_head.T, light)
+    surface = painted(mesh, build_pyramids([texture]))
+    return draw_mix(surface, mesh.vertices, np.ones((count, 1)), brightness, camera, factor)
+
+
+def _coloured(
+    mesh: Mesh, camera: Camera, vertex_colours: Array | None, light: Light | None, factor: int
+) -> UInt8[Array, "h w 4"]:
+    raster = rasterize_mesh(mesh, enlarged(camera, factor))
+    if vertex_colours is not None:
         values = check_array("vertex_colours", vertex_colours, (len(mesh.vertices), 3))
-        colours = interpolate(raster, shown.triangles, values)
+        colours = interpolate(raster, mesh.triangles, values)
     else:
         colours = np.broadcast_to(np.array(CLAY, np.float32), (*raster.depth.shape, 3))
         light = light or Light()
     if light is not None:
-        colours = colours * _shading(shown, raster, large, light)[..., None]
-    image = _reduced(colours, raster.mask, factor)
-    return image if background is None else over_background(image, background)
+        normals = mesh.vertex_normals() @ camera.R_cam_head.T
+        normals = interpolate(raster, mesh.triangles, normals)
+        colours = colours * _brightness(normals, light)[..., None]
+    return _reduced(colours, raster.mask, factor)
 
 
 def shown_parts(mesh: Mesh) -> tuple[str, ...]:
@@ -90,14 +106,8 @@ def shown_parts(mesh: Mesh) -> tuple[str, ...]:
 
 def rasterize_mesh(mesh: Mesh, camera: Camera, *, cull: bool = False) -> Raster:
     """The mesh as the camera sees it (numeric.raster.rasterize in the camera's pixels)."""
-    depth, pixels = camera.to_camera(mesh.vertices)[:, 2], project_safely(mesh, camera)
+    depth, pixels = camera.to_camera(mesh.vertices)[:, 2], project_safely(mesh.vertices, camera)
     return rasterize(pixels, depth, mesh.triangles, camera.width, camera.height, cull=cull)
-
-
-def project_safely(mesh: Mesh, camera: Camera) -> Float[Array, "v 2"]:
-    """(V, 2) px of the vertices; not finite for one in the camera's own plane."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return camera.project(mesh.vertices)
 
 
 def over_background(
@@ -114,29 +124,16 @@ def over_background(
     return np.concatenate([mixed, opaque], axis=2)
 
 
-def _shading(mesh: Mesh, raster: Raster, camera: Camera, light: Light) -> Float[Array, "h w"]:
-    """(H, W) brightness by Lambert's law; the back of a surface is lit like its front."""
-    normals = interpolate(raster, mesh.triangles, mesh.vertex_normals() @ camera.R_cam_head.T)
-    normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-6)
-    normals *= np.where(normals[..., 2:] > 0, -1, 1)
-    brightness: Array = np.full(raster.depth.shape, light.ambient, np.float32)
+def _brightness(normals: Float[Array, "*n 3"], light: Light) -> Float[Array, "*n"]:
+    """By Lambert's law, from normals in camera space; a surface's back is lit like its front."""
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-6)
+    normals = normals * np.where(normals[..., 2:] > 0, -1, 1)
+    brightness = np.full(normals.shape[:-1], light.ambient, np.float32)
     for direction, strength in ((light.key, light.key_strength), (light.fill, light.fill_strength)):
         towards = np.asarray(direction, np.float32)
         towards /= np.linalg.norm(towards)
         brightness += np.float32(strength) * np.maximum(normals @ towards, 0)
     return brightness
-
-
-def _enlarged(camera: Camera, factor: int) -> Camera:
-    if factor == 1:
-        return camera
-    return replace(
-        camera,
-        width=camera.width * factor,
-        height=camera.height * factor,
-        focal_px=camera.focal_px * factor,
-        principal_px=camera.principal * factor,
-    )
 
 
 def _reduced(colours: Array, mask: Array, factor: int) -> UInt8[Array, "h w 4"]:

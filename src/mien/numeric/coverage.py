@@ -1,0 +1,174 @@
+"""Which triangle each sample shows, strip by strip: little memory, and nothing leaves the cache.
+
+The tests at the edges are numeric.raster's, so that the same samples belong to the same triangles;
+what it writes for every pixel is worked out here for the triangles, once, and evaluated only where
+somebody looks.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mien.arrays import Array, Float, Int
+from mien.numeric.raster import clip_columns, edge_line
+
+STRIP = 36
+"""Rows of samples in a strip, whole pixels of 1, 2 or 3 rows; at full HD it fits into a cache."""
+
+# Columns of Coverage.planes.
+X, Y, W0, W1, W2, X1, Y1, X2, Y2 = range(9)
+
+
+class Coverage(NamedTuple):
+    """Triangles on the grid of samples.
+
+    Attributes:
+        points: (V, 2) samples' widths. triangles: (F, 3) vertex indices.
+        boxes: (F, 4) first and last row, first and last column whose centres a triangle can hold;
+            the first row lies after the last where it holds none or cannot be drawn.
+        planes: (F, 9) place of the first corner; 1 / z of the three; by how much the barycentrics
+            of the second and the third grow in x and in y.
+        starts: (strips + 1,) where each strip's triangles start in order.
+        order: triangles strip by strip, in their own order within each.
+    """
+
+    points: Float[Array, "v 2"]
+    triangles: Int[Array, "f 3"]
+    boxes: Int[Array, "f 4"]
+    planes: Float[Array, "f 9"]
+    starts: Int[Array, " s"]
+    order: Int[Array, " n"]
+
+
+def prepare_coverage(
+    points: Float[Array, "v 2"],
+    depth: Float[Array, " v"],
+    triangles: Int[Array, "f 3"],
+    width: int,
+    height: int,
+) -> Coverage:
+    """Triangles ready to be drawn on width x height samples, STRIP rows at a time.
+
+    Args:
+        points: (V, 2). depth: (V,) camera z; a triangle with a vertex at zero, behind it or not
+            finite is skipped.
+    """
+    count = len(triangles)
+    boxes, planes = np.empty((count, 4), np.int32), np.empty((count, 9))
+    starts = np.zeros(-(-height // STRIP) + 1, np.int64)
+    _set_up(points, depth, triangles, width, height, boxes, planes, starts)
+    order = np.empty(starts[-1], np.int32)
+    _sort(boxes, starts, order)
+    return Coverage(points, triangles, boxes, planes, starts, order)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _set_up(
+    points: Array,
+    depth: Array,
+    triangles: Array,
+    width: int,
+    height: int,
+    boxes: Array,
+    planes: Array,
+    starts: Array,
+) -> None:
+    """Fill boxes and planes; in starts[s + 1] leave how many triangles reach strips 0 to s."""
+    for t in range(len(triangles)):
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        ax, bx, cx = points[i, 0], points[j, 0], points[k, 0]
+        ay, by, cy = points[i, 1], points[j, 1], points[k, 1]
+        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+        za, zb, zc = depth[i], depth[j], depth[k]
+        boxes[t, 0], boxes[t, 1] = 0, -1
+        drawable = za > 0.0 and zb > 0.0 and zc > 0.0 and za + zb + zc < np.inf
+        # The comparisons also refuse NaN.
+        if not (drawable and (area < 0.0 or area > 0.0)):
+            continue
+        top = max(np.ceil(min(ay, by, cy) - 0.5), 0.0)
+        bottom = min(np.floor(max(ay, by, cy) - 0.5), height - 1.0)
+        left = max(np.ceil(min(ax, bx, cx) - 0.5), 0.0)
+        right = min(np.floor(max(ax, bx, cx) - 0.5), width - 1.0)
+        if not (top <= bottom and left <= right):
+            continue
+        boxes[t, 0], boxes[t, 1] = int(top), int(bottom)
+        boxes[t, 2], boxes[t, 3] = int(left), int(right)
+        for strip in range(int(top) // STRIP, int(bottom) // STRIP + 1):
+            starts[strip + 1] += 1
+        planes[t, X], planes[t, Y] = ax, ay
+        planes[t, W0], planes[t, W1], planes[t, W2] = 1.0 / za, 1.0 / zb, 1.0 / zc
+        planes[t, X1], planes[t, Y1] = (cy - ay) / area, (ax - cx) / area
+        planes[t, X2], planes[t, Y2] = (ay - by) / area, (bx - ax) / area
+    for strip in range(1, len(starts)):
+        starts[strip] += starts[strip - 1]
+
+
+@njit(cache=True, nogil=True)
+def _sort(boxes: Array, starts: Array, order: Array) -> None:
+    place = starts.copy()
+    for t in range(len(boxes)):
+        if boxes[t, 0] <= boxes[t, 1]:
+            for strip in range(boxes[t, 0] // STRIP, boxes[t, 1] // STRIP + 1):
+                order[place[strip]] = t
+                place[strip] += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cover_strip(coverage: Coverage, strip: int, ids: Array, nearest: Array) -> None:
+    """Write each sample's triangle, -1 for none.
+
+    Args:
+        ids: (STRIP, W) int32. nearest: (STRIP, W) float32 to work with: 1 / z.
+    """
+    ids[:] = -1
+    nearest[:] = 0.0
+    origin = strip * STRIP
+    for n in range(coverage.starts[strip], coverage.starts[strip + 1]):
+        _cover(coverage, coverage.order[n], origin, ids, nearest)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _cover(coverage: Coverage, t: int, origin: int, ids: Array, nearest: Array) -> None:
+    points, triangles, planes = coverage.points, coverage.triangles, coverage.planes
+    i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+    # Counter-clockwise on the screen, as fronts go: the area is negative.
+    if planes[t, X1] * planes[t, Y2] < planes[t, X2] * planes[t, Y1]:
+        j, k = k, j
+    a0, b0, x0, y0, closed0 = edge_line(points, j, k)
+    a1, b1, x1, y1, closed1 = edge_line(points, k, i)
+    a2, b2, x2, y2, closed2 = edge_line(points, i, j)
+    w0 = planes[t, W0]
+    rise1, rise2 = planes[t, W1] - w0, planes[t, W2] - w0
+    across = rise1 * planes[t, X1] + rise2 * planes[t, X2]
+    down = rise1 * planes[t, Y1] + rise2 * planes[t, Y2]
+    step = np.float32(across)
+    first, last = coverage.boxes[t, 2], coverage.boxes[t, 3]
+    top, bottom = max(coverage.boxes[t, 0], origin), min(coverage.boxes[t, 1], origin + STRIP - 1)
+    for row in range(top, bottom + 1):
+        y = row + 0.5
+        left, right = clip_columns(a0, x0, b0 * (y - y0), closed0, first, last)
+        left, right = clip_columns(a1, x1, b1 * (y - y1), closed1, left, right)
+        left, right = clip_columns(a2, x2, b2 * (y - y2), closed2, left, right)
+        # 1/z is linear on the screen.
+        start = np.float32(w0 + across * (left + 0.5 - planes[t, X]) + down * (y - planes[t, Y]))
+        line = row - origin
+        for col in range(left, right + 1):
+            w = start + step * np.float32(col - left)
+            if w > nearest[line, col]:
+                nearest[line, col] = w
+                ids[line, col] = t
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def barycentrics_at(planes: Array, t: int, x: float, y: float) -> tuple[float, float, float]:
+    """Perspective-correct, never negative, summing to 1: a place past an edge comes to the edge."""
+    dx, dy = x - planes[t, X], y - planes[t, Y]
+    second = max(planes[t, X1] * dx + planes[t, Y1] * dy, 0.0)
+    third = max(planes[t, X2] * dx + planes[t, Y2] * dy, 0.0)
+    p0 = max(1.0 - second - third, 0.0) * planes[t, W0]
+    p1, p2 = second * planes[t, W1], third * planes[t, W2]
+    inverse = 1.0 / (p0 + p1 + p2)
+    return p0 * inverse, p1 * inverse, p2 * inverse

@@ -1,0 +1,39 @@
+"""Where a camera's samples see vertices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.camera import Camera
+from mien.errors import InputError
+
+SAMPLES = (1, 4, 9)
+
+
+def samples_across(samples: int) -> int:
+    """Along a pixel's side. Raises: InputError: not 1, 4 or 9."""
+    if samples not in SAMPLES:
+        raise InputError("samples", " or ".join(map(str, SAMPLES)), samples)
+    return int(np.sqrt(samples))
+
+
+def enlarged(camera: Camera, factor: int) -> Camera:
+    """The same view on an image with factor x factor as many pixels."""
+    if factor == 1:
+        return camera
+    return replace(
+        camera,
+        width=camera.width * factor,
+        height=camera.height * factor,
+        focal_px=camera.focal_px * factor,
+        principal_px=camera.principal * factor,
+    )
+
+
+def project_safely(vertices: Float[Array, "v 3"], camera: Camera) -> Float[Array, "v 2"]:
+    """(V, 2) px of the vertices; not finite for one in the camera's own plane."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return camera.project(vertices)
