@@ -13,7 +13,7 @@ import pytest
 
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
-from mien.formats.gltf_animation import GlbAnimation
+from mien.formats.head_animation import HeadAnimation
 from mien.mesh import Mesh
 from mien.model.head import Expression, FittedView, Head
 from mien.numeric.rotation import rotation_from_vector
@@ -90,11 +90,11 @@ def small_head() -> Head:
 
 
 @pytest.fixture
-def nod() -> GlbAnimation:
+def nod() -> HeadAnimation:
     """The mouth opens while the head turns right round about a slanted axis and moves off."""
     times = np.array([0.0, 0.25, 0.5, 1.25, 2.0])
     turn = times[:, None] / 2 * 2 * np.pi * np.array([0.6, 0.8, 0.0])
-    return GlbAnimation(
+    return HeadAnimation(
         times=times,
         target_names=("joy", "jawOpen"),
         weights=np.column_stack([times / 4, [0.0, 0.5, 1.0, -0.25, 1.25]]),

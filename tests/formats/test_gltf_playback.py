@@ -18,7 +18,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from mien.formats.gltf import save_glb
-from mien.formats.gltf_animation import GlbAnimation
+from mien.formats.head_animation import HeadAnimation
 from mien.model.head import Head
 from mien.numeric.rotation import rotation_from_vector
 
@@ -76,7 +76,7 @@ def _picture(png: str) -> np.ndarray:
 
 def test_three_js_plays_it_in_a_browser(
     small_head: Head,
-    nod: GlbAnimation,
+    nod: HeadAnimation,
     tmp_path: Path,
     play: Callable[[Path, list[float]], Playback],
 ) -> None:
@@ -104,7 +104,7 @@ def test_three_js_plays_it_in_a_browser(
 
 def test_three_js_shows_each_expressions_texture(
     small_head: Head,
-    nod: GlbAnimation,
+    nod: HeadAnimation,
     tmp_path: Path,
     play: Callable[[Path, list[float]], Playback],
 ) -> None:

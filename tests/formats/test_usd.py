@@ -97,6 +97,29 @@ def test_each_group_has_its_textured_material(stage: Usd.Stage) -> None:
         assert os.path.basename(texture.GetInput("file").Get().path) == "atlas.jpg"
 
 
+def test_each_expressions_texture_is_a_variant(stage: Usd.Stage) -> None:
+    variants = stage.GetDefaultPrim().GetVariantSets().GetVariantSet("texture")
+    assert variants.GetVariantNames() == ["joy", "neutral"]
+    assert variants.GetVariantSelection() == "neutral"
+    for name, file in (("joy", "joy.jpg"), ("neutral", "atlas.jpg")):
+        variants.SetVariantSelection(name)
+        for material in ("skin", "eyes"):
+            prim = stage.GetPrimAtPath(f"/head/materials/{material}/texture")
+            found = UsdShade.Shader(prim).GetInput("file").Get()
+            assert (found.path, found.resolvedPath[-len(file) - 2 :]) == (file, f"[{file}]")
+        assert complaints(stage) == []
+
+
+def test_one_texture_makes_no_variants(small_head: Head, tmp_path: Path) -> None:
+    joy = replace(small_head.expressions["joy"], texture="atlas")
+    head = replace(small_head, expressions=small_head.expressions | {"joy": joy})
+    save_usdz(head, tmp_path / "head.usdz")
+    stage = Usd.Stage.Open(str(tmp_path / "head.usdz"))
+    assert not stage.GetDefaultPrim().GetVariantSets().GetNames()
+    texture = UsdShade.Shader(stage.GetPrimAtPath("/head/materials/skin/texture"))
+    assert os.path.basename(texture.GetInput("file").Get().path) == "atlas.jpg"
+
+
 def test_the_package_holds_the_texture_uncompressed_and_aligned(
     small_head: Head, tmp_path: Path
 ) -> None:
@@ -105,7 +128,7 @@ def test_the_package_holds_the_texture_uncompressed_and_aligned(
     with zipfile.ZipFile(tmp_path / "head.usdz") as package:
         members = package.infolist()
         contents = {member.filename: package.read(member) for member in members}
-    assert list(contents) == ["head.usdc", "atlas.jpg"]
+    assert list(contents) == ["head.usdc", "atlas.jpg", "joy.jpg"]
     for member in members:
         assert member.compress_type == zipfile.ZIP_STORED
         assert data.index(contents[member.filename]) % 64 == 0

@@ -11,8 +11,9 @@ import numpy as np
 from mien.arrays import Array, Int
 from mien.formats.atomic import atomic_file
 from mien.formats.glb import GlbBuffer, Json
-from mien.formats.gltf_animation import GlbAnimation, animation_json
+from mien.formats.gltf_animation import animation_json
 from mien.formats.gltf_materials import material_json, material_of
+from mien.formats.head_animation import HeadAnimation
 from mien.formats.surface import (
     ExportSurface,
     MaterialGroup,
@@ -33,7 +34,7 @@ def save_glb(
     units: bool = True,
     lit: bool = True,
     image: Literal["JPEG", "PNG"] = "JPEG",
-    animation: GlbAnimation | None = None,
+    animation: HeadAnimation | None = None,
 ) -> None:
     """Write the head as one .glb, whole or not at all.
 
@@ -66,7 +67,7 @@ def glb_bytes(
     units: bool = True,
     lit: bool = True,
     image: Literal["JPEG", "PNG"] = "JPEG",
-    animation: GlbAnimation | None = None,
+    animation: HeadAnimation | None = None,
 ) -> bytes:
     """As save_glb, in memory."""
     shapes = animation.shapes if animation is not None else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import struct
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,7 +23,7 @@ from mien.model.head import Head
 _METRES_PER_UNIT = 0.01
 _UNITS_PER_MM = 0.1
 _ROOT = "/head"
-_TEXTURE = "atlas.jpg"
+_VARIANTS = "texture"
 _PADDING_FIELD = 0x1986  # the extra field's kind that USD itself uses
 
 
@@ -34,7 +34,8 @@ def save_usdz(
 
     One mesh with a subset and a UsdPreviewSurface for each group of parts. Face units and
     photographed expressions are UsdSkel blend shapes, bound to a skeleton of one joint and to an
-    animation that holds their weights, all zero.
+    animation that holds their weights, all zero. Expressions with a texture of their own make a
+    variant set of the head, "texture": one is chosen, none are mixed.
 
     Args:
         parts: names of parts; by default all but the hair cap and the lashes.
@@ -49,11 +50,12 @@ def save_usdz(
     with TemporaryDirectory(prefix="mien-usd-") as folder:
         layer = Path(folder, "head.usdc")
         stage = Usd.Stage.CreateNew(str(layer))
-        _fill_stage(stage, surface, head)
+        files = _texture_files(surface)
+        _fill_stage(stage, surface, head, files)
         stage.Save()
         members = {layer.name: layer.read_bytes()}
-    if surface.texture is not None:
-        members[_TEXTURE] = encode_image(surface.texture, "JPEG")
+    for name, file in files.items():
+        members[file] = encode_image(surface.textures[name], "JPEG")
     data = _package(members)
     with atomic_file(path) as temporary:
         temporary.write_bytes(data)
@@ -75,7 +77,25 @@ def _package(members: dict[str, bytes]) -> bytes:
     return stream.getvalue()
 
 
-def _fill_stage(stage: Any, surface: ExportSurface, head: Head) -> None:
+def _texture_files(surface: ExportSurface) -> dict[str, str]:
+    """The textures' names in the package."""
+    files: dict[str, str] = {}
+    for name in surface.textures:
+        files[name] = f"{_free_name(name, {file[:-4] for file in files.values()})}.jpg"
+    return files
+
+
+def _free_name(name: str, taken: Container[str]) -> str:
+    """As near to the name as USD allows, and not one that is taken."""
+    from pxr import Tf
+
+    free: str = Tf.MakeValidIdentifier(name)
+    while free in taken:
+        free += "_"
+    return free
+
+
+def _fill_stage(stage: Any, surface: ExportSurface, head: Head, files: dict[str, str]) -> None:
     from pxr import UsdGeom, UsdSkel
 
     UsdGeom.SetStageMetersPerUnit(stage, _METRES_PER_UNIT)
@@ -88,7 +108,8 @@ def _fill_stage(stage: Any, surface: ExportSurface, head: Head) -> None:
     extent = mesh.GetExtentAttr().Get()
     root.CreateExtentAttr(extent)
     for group in surface.groups:
-        _bind_material(stage, mesh, group, textured=surface.texture is not None)
+        _bind_material(stage, mesh, group, textured=bool(files))
+    _assign_textures(stage, surface, files)
     if surface.targets:
         _define_blend_shapes(stage, mesh, surface.targets)
 
@@ -146,12 +167,37 @@ def _texture_output(stage: Any, material: Any) -> Any:
     place = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
     texture = UsdShade.Shader.Define(stage, material.GetPath().AppendChild("texture"))
     texture.CreateIdAttr("UsdUVTexture")
-    texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(_TEXTURE)
     texture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
     texture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(place)
     for wrap in ("wrapS", "wrapT"):
         texture.CreateInput(wrap, Sdf.ValueTypeNames.Token).Set("clamp")
     return texture.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
+
+
+def _assign_textures(stage: Any, surface: ExportSurface, files: dict[str, str]) -> None:
+    """Neutral's texture for good where it is the only one, else a variant for each expression."""
+    if len(files) < 2:
+        for file in files.values():
+            _set_file(stage, surface, file)
+        return
+    # A value beside the variants would be stronger than theirs, so none is set there.
+    variants = stage.GetDefaultPrim().GetVariantSets().AddVariantSet(_VARIANTS)
+    names: list[str] = []
+    for expression, texture in surface.texture_of.items():
+        names.append(_free_name(expression, names))
+        variants.AddVariant(names[-1])
+        variants.SetVariantSelection(names[-1])
+        with variants.GetVariantEditContext():
+            _set_file(stage, surface, files[texture])
+    variants.SetVariantSelection(names[0])
+
+
+def _set_file(stage: Any, surface: ExportSurface, file: str) -> None:
+    from pxr import Sdf, UsdShade
+
+    for group in surface.groups:
+        prim = stage.GetPrimAtPath(f"{_ROOT}/materials/{group.name}/texture")
+        UsdShade.Shader(prim).CreateInput("file", Sdf.ValueTypeNames.Asset).Set(file)
 
 
 def _define_blend_shapes(stage: Any, mesh: Any, targets: tuple[MorphTarget, ...]) -> None:
@@ -182,12 +228,12 @@ def _define_blend_shapes(stage: Any, mesh: Any, targets: tuple[MorphTarget, ...]
 
 def _define_blend_shape(stage: Any, mesh: Any, target: MorphTarget) -> Any:
     """Its path, which has the target's name as nearly as USD allows."""
-    from pxr import Tf, UsdSkel
+    from pxr import UsdSkel
 
-    name = Tf.MakeValidIdentifier(target.name)
-    while stage.GetPrimAtPath(mesh.GetPath().AppendChild(name)):
-        name += "_"
-    shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(name))
+    taken = {child.GetName() for child in mesh.GetPrim().GetChildren()}
+    shape = UsdSkel.BlendShape.Define(
+        stage, mesh.GetPath().AppendChild(_free_name(target.name, taken))
+    )
     shape.CreateOffsetsAttr(_points(target.offsets))
     shape.CreatePointIndicesAttr(_integers(target.vertices))
     return shape.GetPath()
