@@ -26,17 +26,14 @@ def channels(glb: Glb) -> dict[str, dict[str, Any]]:
     }
 
 
-@pytest.mark.parametrize("interpolation", ["LINEAR", "STEP"])
 def test_the_khronos_validator_has_nothing_to_say(
     small_head: Head,
     nod: HeadAnimation,
     tmp_path: Path,
     gltf_remarks: Callable[[Path], list[str]],
-    interpolation: Any,
 ) -> None:
-    path = tmp_path / "head.glb"
-    save_glb(small_head, path, animation=replace(nod, interpolation=interpolation))
-    assert gltf_remarks(path) == []
+    save_glb(small_head, tmp_path / "head.glb", animation=nod)
+    assert gltf_remarks(tmp_path / "head.glb") == []
 
 
 def test_times_have_their_bounds(small_head: Head, nod: HeadAnimation) -> None:

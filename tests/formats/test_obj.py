@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from mien.errors import InputError
 from mien.formats.obj import save_obj
@@ -27,6 +28,38 @@ def test_trimesh_opens_it_with_its_texture(small_head: Head, tmp_path: Path) -> 
         np.testing.assert_allclose(found.visual.uv[found.faces], uvs, atol=1e-6)
         pixels = np.asarray(found.visual.material.image.convert("RGB"))
         np.testing.assert_array_equal(pixels, small_head.textures["atlas"])
+
+
+def test_an_expression_comes_with_its_texture_and_the_same_order(
+    small_head: Head, tmp_path: Path
+) -> None:
+    save_obj(small_head, tmp_path / "joy.obj", expression="joy")
+    scene = trimesh.load_scene(tmp_path / "joy.obj", process=False)
+    mesh, joy = small_head.mesh, small_head.expressions["joy"]
+    for name, part in (("skin", "skin"), ("eyes", "left_eyeball")):
+        found = scene.geometry[name]
+        expected = joy.vertices[mesh.triangles[mesh.triangles_of(part)]]
+        np.testing.assert_allclose(found.vertices[found.faces], expected, rtol=1e-6, atol=1e-5)
+        pixels = np.asarray(found.visual.material.image.convert("RGB"))
+        np.testing.assert_array_equal(pixels, small_head.textures["joy"])
+    save_obj(small_head, tmp_path / "neutral.obj")
+    faces = [
+        [line for line in (tmp_path / name).read_text("utf-8").splitlines() if line[:2] == "f "]
+        for name in ("joy.obj", "neutral.obj")
+    ]
+    assert faces[0] == faces[1]
+
+
+def test_an_expression_without_texture_shows_neutrals(small_head: Head, tmp_path: Path) -> None:
+    textures = {"atlas": small_head.textures["atlas"]}
+    save_obj(replace(small_head, textures=textures), tmp_path / "joy.obj", expression="joy")
+    with Image.open(tmp_path / "joy.png") as image:
+        np.testing.assert_array_equal(np.asarray(image), textures["atlas"])
+
+
+def test_an_expression_that_the_head_has_not(small_head: Head, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="expression: expected one of neutral, joy, got anger"):
+        save_obj(small_head, tmp_path / "head.obj", expression="anger")
 
 
 def test_normals_point_out(small_head: Head, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from mien.errors import InputError
+from mien.formats.head_animation import HeadAnimation
 from mien.formats.usd import save_usdz
 from mien.model.head import Head
 
@@ -133,6 +134,27 @@ def test_the_package_holds_the_texture_uncompressed_and_aligned(
         assert member.compress_type == zipfile.ZIP_STORED
         assert data.index(contents[member.filename]) % 64 == 0
         assert member.date_time[0] == 1980, "not the date of writing"
+
+
+def test_it_moves(small_head: Head, nod: HeadAnimation, tmp_path: Path) -> None:
+    save_usdz(small_head, tmp_path / "head.usdz", animation=nod)
+    stage = Usd.Stage.Open(str(tmp_path / "head.usdz"))
+    assert complaints(stage) == []
+    second = stage.GetTimeCodesPerSecond()
+    assert stage.GetStartTimeCode() == 0
+    assert stage.GetEndTimeCode() / second == pytest.approx(2)
+    weights = UsdSkel.Animation(stage.GetPrimAtPath("/head/skeleton/animation"))
+    names = list(weights.GetBlendShapesAttr().Get())
+    expected = nod.weights_of(names)
+    assert nod.rotations is not None
+    assert nod.translations_mm is not None
+    for index, time in enumerate(nod.times):
+        found = weights.GetBlendShapeWeightsAttr().Get(time * second)
+        np.testing.assert_allclose(np.array(found), expected[index], atol=1e-6)
+        root = UsdGeom.Xformable(stage.GetDefaultPrim())
+        place = np.array(root.ComputeLocalToWorldTransform(time * second)).T
+        np.testing.assert_allclose(place[:3, :3], nod.rotations[index], atol=1e-6)
+        np.testing.assert_allclose(MM * place[:3, 3], nod.translations_mm[index], atol=1e-5)
 
 
 def test_names_that_usd_cannot_use_stay_apart(small_head: Head, tmp_path: Path) -> None:

@@ -37,11 +37,7 @@ def animation_json(
             for index, path in enumerate(samples)
         ],
         "samplers": [
-            {
-                "input": times,
-                "output": buffer.add_samples(values),
-                "interpolation": animation.interpolation,
-            }
+            {"input": times, "output": buffer.add_samples(values), "interpolation": "LINEAR"}
             for values in samples.values()
         ],
     }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from mien.errors import InputError
 
 @dataclass(frozen=True)
 class HeadAnimation:
-    """What changes over time.
+    """What changes over time; straight on from each time to the next.
 
     Attributes:
         times: (T,) seconds from 0 up, each later than the one before by what float32 can tell.
@@ -25,7 +24,6 @@ class HeadAnimation:
             the head neither turns nor moves.
         shapes: morph targets that the file gets for this animation: (V, 3) mm over the head's
             vertices, by name.
-        interpolation: what happens between the times.
         name: what players list it as.
     Raises: InputError: shapes that do not fit, NaN, no time, time that stands or runs backwards,
         a name twice, a matrix that is no rotation.
@@ -37,7 +35,6 @@ class HeadAnimation:
     rotations: Float[Array, "t 3 3"] | None = None
     translations_mm: Float[Array, "t 3"] | None = None
     shapes: Mapping[str, Float[Array, "v 3"]] = field(default_factory=dict)
-    interpolation: Literal["LINEAR", "STEP"] = "LINEAR"
     name: str = "animation"
 
     def __post_init__(self) -> None:
@@ -46,8 +43,6 @@ class HeadAnimation:
         if len(set(names)) < len(names):
             twice = next(name for name in names if names.count(name) > 1)
             raise InputError("target_names", "each name once", f"{twice} more than once")
-        if self.interpolation not in ("LINEAR", "STEP"):
-            raise InputError("interpolation", "LINEAR or STEP", self.interpolation)
         weights = np.zeros((count, 0)) if self.weights is None else self.weights
         object.__setattr__(self, "times", frozen(times))
         object.__setattr__(self, "target_names", names)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,20 +15,29 @@ from mien.formats.atomic import atomic_file
 from mien.formats.image import encode_image
 from mien.formats.surface import ExportSurface, export_surface
 from mien.mesh import Mesh
-from mien.model.head import Head
+from mien.model.head import NEUTRAL, Head
 
 
-def save_obj(head: Head, path: str | Path, *, parts: Iterable[str] | None = None) -> None:
-    """Write the neutral head in millimetres: X.obj, X.mtl and, where it has a texture, X.png.
+def save_obj(
+    head: Head,
+    path: str | Path,
+    *,
+    parts: Iterable[str] | None = None,
+    expression: str = NEUTRAL,
+) -> None:
+    """Write one expression in millimetres: X.obj, X.mtl and, where it has a texture, X.png.
 
-    A group and a material for each group of parts. Face units have no place in the format.
+    A group and a material for each group of parts. Face units have no place in the format; files
+    of several expressions have the same vertices in the same order, as programs want that make
+    blend shapes of them.
 
     Args:
         parts: names of parts; by default all but the hair cap and the lashes.
-    Raises: InputError: an unknown part, a place that cannot be written.
+        expression: which of the photographed ones, with its texture.
+    Raises: InputError: an unknown part or expression, a place that cannot be written.
     """
     path = Path(path)
-    surface = export_surface(head, parts=parts, units=False)
+    surface = export_surface(_at_rest_in(head, expression), parts=parts, units=False)
     # Many readers end a file's name at the first space.
     stem = re.sub(r"\s+", "_", path.stem)
     library, picture = f"{stem}.mtl", f"{stem}.png"
@@ -43,6 +53,14 @@ def save_obj(head: Head, path: str | Path, *, parts: Iterable[str] | None = None
     with ExitStack() as stack:
         for file, data in contents.items():
             stack.enter_context(atomic_file(file)).write_bytes(data)
+
+
+def _at_rest_in(head: Head, name: str) -> Head:
+    """The head as if this expression were its neutral one, and its only one."""
+    mesh, expression = head.expression_mesh(name), head.expressions[name]
+    if expression.texture not in head.textures:
+        expression = replace(expression, texture=head.expressions[NEUTRAL].texture)
+    return replace(head, mesh=mesh, expressions={NEUTRAL: expression})
 
 
 def _obj(surface: ExportSurface, library: str) -> str:

@@ -188,10 +188,10 @@ def _texture_of(head: Head) -> dict[str, str]:
     neutral = head.expressions[NEUTRAL].texture
     if neutral not in head.textures:
         return {}
-    textures = {NEUTRAL: neutral}
-    for name, expression in head.expressions.items():
-        textures[name] = expression.texture if expression.texture in head.textures else neutral
-    return textures
+    return {NEUTRAL: neutral} | {
+        name: expression.texture if expression.texture in head.textures else neutral
+        for name, expression in head.expressions.items()
+    }
 
 
 def _target(name: str, offsets: Float[Array, "v 3"]) -> MorphTarget:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import struct
 import zipfile
-from collections.abc import Container, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,43 +15,56 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.errors import InputError
 from mien.formats.atomic import atomic_file
+from mien.formats.head_animation import HeadAnimation
 from mien.formats.image import encode_image
-from mien.formats.surface import ExportSurface, MaterialGroup, MorphTarget, export_surface
+from mien.formats.surface import ExportSurface, MorphTarget, export_surface
+from mien.formats.usd_materials import define_materials, free_name, integers, texture_files
 from mien.model.head import Head
 
 # USD's own default unit, and what programs assume that do not read the file's.
 _METRES_PER_UNIT = 0.01
 _UNITS_PER_MM = 0.1
 _ROOT = "/head"
-_VARIANTS = "texture"
+_ANIMATION = f"{_ROOT}/skeleton/animation"
+_DEFAULT_RATE = 24.0  # time codes a second: USD's own
 _PADDING_FIELD = 0x1986  # the extra field's kind that USD itself uses
 
 
 def save_usdz(
-    head: Head, path: str | Path, *, parts: Iterable[str] | None = None, units: bool = True
+    head: Head,
+    path: str | Path,
+    *,
+    parts: Iterable[str] | None = None,
+    units: bool = True,
+    animation: HeadAnimation | None = None,
 ) -> None:
     """Write the head as one .usdz, whole or not at all: centimetres, y up.
 
     One mesh with a subset and a UsdPreviewSurface for each group of parts. Face units and
     photographed expressions are UsdSkel blend shapes, bound to a skeleton of one joint and to an
-    animation that holds their weights, all zero. Expressions with a texture of their own make a
-    variant set of the head, "texture": one is chosen, none are mixed.
+    animation that holds their weights, zero unless the head moves. Expressions with a texture of
+    their own make a variant set of the head, "texture": one is chosen, none are mixed.
 
     Args:
         parts: names of parts; by default all but the hair cap and the lashes.
         units: with the face units.
-    Raises: InputError: usd-core is not installed; an unknown part, a place that cannot be written.
+        animation: how the head moves.
+    Raises: InputError: usd-core is not installed; an unknown part, an animation of targets that
+        the file has not, a place that cannot be written.
     """
     try:
         from pxr import Usd
     except ImportError:
         raise InputError(path, "usd-core (pip install 'mien[usd]')", "no such package") from None
-    surface = export_surface(head, parts=parts, units=units)
+    shapes = animation.shapes if animation is not None else None
+    surface = export_surface(head, parts=parts, units=units, shapes=shapes)
     with TemporaryDirectory(prefix="mien-usd-") as folder:
         layer = Path(folder, "head.usdc")
         stage = Usd.Stage.CreateNew(str(layer))
-        files = _texture_files(surface)
+        files = texture_files(surface)
         _fill_stage(stage, surface, head, files)
+        if animation is not None:
+            _animate(stage, animation, [target.name for target in surface.targets])
         stage.Save()
         members = {layer.name: layer.read_bytes()}
     for name, file in files.items():
@@ -77,24 +90,6 @@ def _package(members: dict[str, bytes]) -> bytes:
     return stream.getvalue()
 
 
-def _texture_files(surface: ExportSurface) -> dict[str, str]:
-    """The textures' names in the package."""
-    files: dict[str, str] = {}
-    for name in surface.textures:
-        files[name] = f"{_free_name(name, {file[:-4] for file in files.values()})}.jpg"
-    return files
-
-
-def _free_name(name: str, taken: Container[str]) -> str:
-    """As near to the name as USD allows, and not one that is taken."""
-    from pxr import Tf
-
-    free: str = Tf.MakeValidIdentifier(name)
-    while free in taken:
-        free += "_"
-    return free
-
-
 def _fill_stage(stage: Any, surface: ExportSurface, head: Head, files: dict[str, str]) -> None:
     from pxr import UsdGeom, UsdSkel
 
@@ -107,9 +102,7 @@ def _fill_stage(stage: Any, surface: ExportSurface, head: Head, files: dict[str,
     mesh = _define_mesh(stage, surface)
     extent = mesh.GetExtentAttr().Get()
     root.CreateExtentAttr(extent)
-    for group in surface.groups:
-        _bind_material(stage, mesh, group, textured=bool(files))
-    _assign_textures(stage, surface, files)
+    define_materials(stage, mesh, surface, files)
     if surface.targets:
         _define_blend_shapes(stage, mesh, surface.targets)
 
@@ -123,7 +116,7 @@ def _define_mesh(stage: Any, surface: ExportSurface) -> Any:
     prim.CreatePointsAttr(points)
     prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
     prim.CreateFaceVertexCountsAttr(Vt.IntArray(len(mesh.triangles), 3))
-    prim.CreateFaceVertexIndicesAttr(_integers(mesh.triangles))
+    prim.CreateFaceVertexIndicesAttr(integers(mesh.triangles))
     # A triangle mesh is meant as it is; the default would round it off.
     prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     prim.CreateDoubleSidedAttr(True)
@@ -134,70 +127,8 @@ def _define_mesh(stage: Any, surface: ExportSurface) -> Any:
             "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying
         )
         coordinates.Set(Vt.Vec2fArray.FromNumpy(mesh.uvs.astype(np.float32)))
-        coordinates.SetIndices(_integers(mesh.uv_triangles))
+        coordinates.SetIndices(integers(mesh.uv_triangles))
     return prim
-
-
-def _bind_material(stage: Any, mesh: Any, group: MaterialGroup, *, textured: bool) -> None:
-    from pxr import Sdf, UsdGeom, UsdShade
-
-    material = UsdShade.Material.Define(stage, f"{_ROOT}/materials/{group.name}")
-    shader = UsdShade.Shader.Define(stage, material.GetPath().AppendChild("surface"))
-    shader.CreateIdAttr("UsdPreviewSurface")
-    shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(0.0)
-    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(group.roughness)
-    color = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
-    if textured:
-        color.ConnectToSource(_texture_output(stage, material))
-    output = shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
-    material.CreateSurfaceOutput().ConnectToSource(output)
-    subset = UsdShade.MaterialBindingAPI(mesh).CreateMaterialBindSubset(
-        group.name, _integers(group.triangles), UsdGeom.Tokens.face
-    )
-    UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
-
-
-def _texture_output(stage: Any, material: Any) -> Any:
-    """The colour of the atlas at the mesh's texture coordinates."""
-    from pxr import Sdf, UsdShade
-
-    reader = UsdShade.Shader.Define(stage, material.GetPath().AppendChild("coordinates"))
-    reader.CreateIdAttr("UsdPrimvarReader_float2")
-    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
-    place = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
-    texture = UsdShade.Shader.Define(stage, material.GetPath().AppendChild("texture"))
-    texture.CreateIdAttr("UsdUVTexture")
-    texture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
-    texture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(place)
-    for wrap in ("wrapS", "wrapT"):
-        texture.CreateInput(wrap, Sdf.ValueTypeNames.Token).Set("clamp")
-    return texture.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
-
-
-def _assign_textures(stage: Any, surface: ExportSurface, files: dict[str, str]) -> None:
-    """Neutral's texture for good where it is the only one, else a variant for each expression."""
-    if len(files) < 2:
-        for file in files.values():
-            _set_file(stage, surface, file)
-        return
-    # A value beside the variants would be stronger than theirs, so none is set there.
-    variants = stage.GetDefaultPrim().GetVariantSets().AddVariantSet(_VARIANTS)
-    names: list[str] = []
-    for expression, texture in surface.texture_of.items():
-        names.append(_free_name(expression, names))
-        variants.AddVariant(names[-1])
-        variants.SetVariantSelection(names[-1])
-        with variants.GetVariantEditContext():
-            _set_file(stage, surface, files[texture])
-    variants.SetVariantSelection(names[0])
-
-
-def _set_file(stage: Any, surface: ExportSurface, file: str) -> None:
-    from pxr import Sdf, UsdShade
-
-    for group in surface.groups:
-        prim = stage.GetPrimAtPath(f"{_ROOT}/materials/{group.name}/texture")
-        UsdShade.Shader(prim).CreateInput("file", Sdf.ValueTypeNames.Asset).Set(file)
 
 
 def _define_blend_shapes(stage: Any, mesh: Any, targets: tuple[MorphTarget, ...]) -> None:
@@ -209,7 +140,7 @@ def _define_blend_shapes(stage: Any, mesh: Any, targets: tuple[MorphTarget, ...]
     skeleton.CreateBindTransformsAttr(still)
     skeleton.CreateRestTransformsAttr(still)
     names = Vt.TokenArray([target.name for target in targets])
-    animation = UsdSkel.Animation.Define(stage, f"{_ROOT}/skeleton/animation")
+    animation = UsdSkel.Animation.Define(stage, _ANIMATION)
     animation.CreateBlendShapesAttr(names)
     animation.CreateBlendShapeWeightsAttr(Vt.FloatArray(len(targets)))
     UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets(
@@ -232,20 +163,43 @@ def _define_blend_shape(stage: Any, mesh: Any, target: MorphTarget) -> Any:
 
     taken = {child.GetName() for child in mesh.GetPrim().GetChildren()}
     shape = UsdSkel.BlendShape.Define(
-        stage, mesh.GetPath().AppendChild(_free_name(target.name, taken))
+        stage, mesh.GetPath().AppendChild(free_name(target.name, taken))
     )
     shape.CreateOffsetsAttr(_points(target.offsets))
-    shape.CreatePointIndicesAttr(_integers(target.vertices))
+    shape.CreatePointIndicesAttr(integers(target.vertices))
     return shape.GetPath()
+
+
+def _animate(stage: Any, animation: HeadAnimation, names: list[str]) -> None:
+    """Time samples of the blend shapes' weights and of the whole head's place.
+
+    Frames fall on whole time codes where they are evenly spaced.
+    """
+    from pxr import Gf, UsdGeom, UsdSkel, Vt
+
+    times = animation.times
+    rate = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else _DEFAULT_RATE
+    codes = (rate * times).tolist()
+    stage.SetTimeCodesPerSecond(rate)
+    stage.SetStartTimeCode(codes[0])
+    stage.SetEndTimeCode(codes[-1])
+    weights = animation.weights_of(names)
+    if names:
+        attribute = UsdSkel.Animation(stage.GetPrimAtPath(_ANIMATION)).GetBlendShapeWeightsAttr()
+        for code, row in zip(codes, weights, strict=True):
+            attribute.Set(Vt.FloatArray.FromNumpy(row.astype(np.float32)), code)
+    place = UsdGeom.Xformable(stage.GetDefaultPrim())
+    if animation.translations_mm is not None:
+        translate = place.AddTranslateOp()
+        for code, row in zip(codes, _UNITS_PER_MM * animation.translations_mm, strict=True):
+            translate.Set(Gf.Vec3d(*row.tolist()), code)
+    if animation.quaternions is not None:
+        orient = place.AddOrientOp()
+        for code, (x, y, z, w) in zip(codes, animation.quaternions.tolist(), strict=True):
+            orient.Set(Gf.Quatf(w, x, y, z), code)
 
 
 def _points(millimetres: Float[Array, "n 3"]) -> Any:
     from pxr import Vt
 
     return Vt.Vec3fArray.FromNumpy((_UNITS_PER_MM * millimetres).astype(np.float32))
-
-
-def _integers(indices: Array) -> Any:
-    from pxr import Vt
-
-    return Vt.IntArray.FromNumpy(indices.astype(np.int32).ravel())
