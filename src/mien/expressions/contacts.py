@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from mien.arrays import Array, Float, check_array
+from mien.arrays import Array, Float, check_array, frozen
 from mien.assets.generic import GenericHead
 from mien.expressions.followers import Followers
 from mien.expressions.gaze import LOOK_UNITS, SIDES, Look, turn_eyeballs
 from mien.expressions.lids import Lids, close_lids, resolve_lids
+from mien.expressions.lips import Lips, part_lips, resolve_lips
 from mien.expressions.state import Gaze
 from mien.expressions.transfer import transfer_units
 
@@ -22,10 +24,12 @@ class Contacts:
 
     Attributes:
         lids: of the left and the right eye.
+        lips: upper and lower.
         followers: the lashes and the hair, which go with the lids.
     """
 
     lids: tuple[Lids, Lids]
+    lips: Lips
     followers: Followers
 
     @staticmethod
@@ -33,12 +37,13 @@ class Contacts:
         """For a head with these neutral vertices, (V, 3) mm. Raises: InputError: shape, NaN."""
         vertices = check_array("vertices", vertices, generic.mesh.vertices.shape)
         left, right = (Lids.of(generic, vertices, side) for side in SIDES)
-        return Contacts((left, right), Followers.of(generic))
+        return Contacts((left, right), Lips.of(generic, vertices), Followers.of(generic))
 
     def resolved(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
         """(V, 3) mm with every contact resolved; the same array where there is none."""
-        moves = np.zeros_like(vertices)
-        touched = False
+        apart = resolve_lips(self.lips, vertices)
+        moves = np.zeros_like(vertices) if apart is None else apart
+        touched = apart is not None
         for lids in self.lids:
             moved = resolve_lids(lids, vertices)
             if moved is not None:
@@ -58,13 +63,16 @@ class Mechanics:
     Attributes:
         look: how the eyes turn.
         contacts: what must not pass through what.
+        close: (V, 3) mm, the offsets of mouthClose.
     """
 
     look: Look
     contacts: Contacts
+    close: Float[Array, "v 3"]
 
-    taken_over = LOOK_UNITS
-    """Units whose eyeballs turn instead of moving by the offsets."""
+    taken_over: ClassVar[tuple[str, ...]] = (*LOOK_UNITS, "mouthClose")
+    """Units that do something else than add their offsets: eyeballs turn, and a mouth can be
+    closed only as far as the jaw is open."""
 
     @staticmethod
     def of(
@@ -76,7 +84,8 @@ class Mechanics:
         """
         units = check_array("units", units, generic.unit_offsets.shape)
         vertices = check_array("vertices", vertices, generic.mesh.vertices.shape)
-        return Mechanics(Look.of(generic, vertices, units), Contacts.of(generic, vertices))
+        close = frozen(units[generic.unit_names.index("mouthClose")])
+        return Mechanics(Look.of(generic, vertices, units), Contacts.of(generic, vertices), close)
 
     def applied(
         self,
@@ -90,11 +99,14 @@ class Mechanics:
 
         Args:
             vertices: (V, 3) mm, the neutral or any mixed face with all units added as offsets,
-                those of `taken_over` too: what they did to the eyeballs is replaced.
+                those of `taken_over` too.
             units: weights by name.
             gaze: in addition to what the units say; the lids go along.
             contacts: off where a face is to be as it was photographed.
         """
+        idle = units.get("mouthClose", 0.0) - max(units.get("jawOpen", 0.0), 0.0)
+        if idle > 0:
+            vertices = vertices - idle * self.close
         vertices = self.look.applied(vertices, units, gaze or Gaze())
         return self.contacts.resolved(vertices) if contacts else vertices
 
@@ -111,4 +123,5 @@ def fit_units(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[Arra
     """
     units = transfer_units(generic, vertices)
     units = close_lids(generic, vertices, turn_eyeballs(generic, vertices, units))
+    units = part_lips(generic, vertices, units)
     return units.astype(np.float32)
