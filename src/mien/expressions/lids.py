@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mien.arrays import Array, Float, Int, frozen
+from mien.arrays import Array, Bool, Float, Int, frozen
 from mien.assets.generic import GenericHead
 from mien.expressions.gaze import SIDES, Eyeball
 from mien.expressions.margins import behind, distances_from, fading, full_path, skin_edges
@@ -22,7 +22,7 @@ _OVERLAP_MM = 0.35
 _IN_FRONT_MM = 0.15
 _REACH_MM = 14.0
 """How far over the closed lid a correction of its edge fades out."""
-_BALL_MM = 9.0
+_BALL_MM = 18.0
 """Skin further off the eyeball has nothing to do with it."""
 _ALLOWED = 1e-6
 _STEPS = (0.25, 0.5, 0.75, 1.0)
@@ -37,7 +37,8 @@ class Lids:
         vertices: (L,) the skin on and around the lids, the edges first: upper, then lower.
         upper, lower: how many vertices the upper and the lower edge have, from the inner to the
             outer corner, both of which are in both.
-        share: (L,) how far a correction of the upper edge goes along.
+        share: (L,) how far a correction of the nearer edge goes along.
+        on_upper: (L,) whether that is the upper one.
         least: (L,) radius below which a vertex is in the eyeball; its own at rest if that is less;
             0 on the back of the lids, which may be.
         axes: (3, 3) rows: towards the middle of the lids, towards the outer corner, upwards.
@@ -48,6 +49,7 @@ class Lids:
     upper: int
     lower: int
     share: Float[Array, " l"]
+    on_upper: Bool[Array, " l"]
     least: Float[Array, " l"]
     axes: Float[Array, "3 3"]
 
@@ -68,14 +70,22 @@ class Lids:
         around = around[(off < _BALL_MM / eyeball.radius) & (off > -0.5)]
         inner = np.setdiff1d(around, np.concatenate([upper, lower]))
         chosen = np.concatenate([upper, lower, inner])
-        share = fading(distance[chosen], _REACH_MM) * np.isin(nearest[chosen], upper)
+        share = fading(distance[chosen], _REACH_MM)
+        on_upper = np.isin(nearest[chosen], upper)
         axes = _axes(eyeball.on_sphere(vertices[upper[[0, -1]]]))
         radius = np.linalg.norm(eyeball.on_sphere(vertices[chosen]), axis=1)
         least = np.minimum(radius, 1 + _CLEARANCE_MM / eyeball.radius)
-        socket = np.flatnonzero(generic.regions["eye_socket"] > 0)
-        least[np.isin(chosen, behind(edges, np.concatenate([upper, lower]), socket))] = 0.0
+        back = behind(edges, np.concatenate([upper, lower]), generic.vertex_of("nose_tip"))
+        least[np.isin(chosen, back)] = 0.0
         return Lids(
-            eyeball, frozen(chosen), len(upper), len(lower), frozen(share), frozen(least), axes
+            eyeball=eyeball,
+            vertices=frozen(chosen),
+            upper=len(upper),
+            lower=len(lower),
+            share=frozen(share),
+            on_upper=frozen(on_upper),
+            least=frozen(least),
+            axes=axes,
         )
 
     def places(self, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
@@ -119,7 +129,7 @@ class Lids:
     def spread(
         self, places: Float[Array, "l 3"], corrections: Float[Array, " u"]
     ) -> Float[Array, " l"]:
-        """(L,) what corrections of the upper edge's vertices are elsewhere on the lid."""
+        """(L,) what corrections along the upper edge are elsewhere on both lids."""
         upper, _ = self.edges(places)
         along: Array = np.interp(places[:, 0], _rising(upper[:, 0]), corrections) * self.share
         return along
@@ -156,11 +166,11 @@ def _closed(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
     places = lids.places(vertices)
     places[:, 2] = np.maximum(places[:, 2], lids.least)
     down = lids.overlap(places) - lids.full_overlap
-    places[:, 1] += lids.spread(places, down)
+    places[:, 1] += lids.spread(places, down) * lids.on_upper
     upper, lower = lids.edges(places)
     wanted = np.interp(upper[:, 0], _rising(lower[:, 0]), lower[:, 2])
     wanted += lids.full_overlap * (_IN_FRONT_MM / _OVERLAP_MM)
-    places[:, 2] += lids.spread(places, wanted - upper[:, 2])
+    places[:, 2] += lids.spread(places, wanted - upper[:, 2]) * lids.on_upper
     return lids.at(places)
 
 
@@ -200,7 +210,9 @@ def resolve_lids(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3
         return None
     resolved = places.copy()
     if not apart:
-        resolved[:, 1] += lids.spread(places, np.maximum(too_far, 0.0))
+        # Either lid gives way by half.
+        back = lids.spread(places, np.maximum(too_far, 0.0)) / 2
+        resolved[:, 1] += np.where(lids.on_upper, back, -back)
     resolved[:, 2] = np.maximum(resolved[:, 2], lids.least)
     moved: Array = lids.at(resolved) - lids.at(places)
     return moved

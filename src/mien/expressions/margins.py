@@ -52,14 +52,11 @@ def fading(distance: Float[Array, " n"], reach: float) -> Float[Array, " n"]:
     return faded
 
 
-def behind(
-    edges: csr_matrix, margin: Int[Array, " n"], inside: Int[Array, " m"]
-) -> Int[Array, " v"]:
-    """Vertices that one reaches from `inside` without crossing the margin, itself not counted."""
+def behind(edges: csr_matrix, margin: Int[Array, " n"], front: int) -> Int[Array, " v"]:
+    """Vertices that one cannot reach from the one in front without crossing the closed margin."""
     from scipy.sparse.csgraph import connected_components
 
     kept = np.setdiff1d(np.arange(edges.shape[0]), margin)
     _, label = connected_components(edges[kept][:, kept], directed=False)
-    wanted = label[np.isin(kept, inside)]
-    reached: Array = kept[np.isin(label, wanted)]
-    return reached
+    unreached: Array = kept[label != label[kept == front]]
+    return unreached
