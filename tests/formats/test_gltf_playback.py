@@ -102,6 +102,22 @@ def test_three_js_plays_it_in_a_browser(
     assert np.abs(first - later).mean() > 2, "the picture stands still"
 
 
+def test_the_head_that_ships_stands_upright_and_opens_its_mouth(
+    generic: Head, tmp_path: Path, play: Callable[[Path, list[float]], Playback]
+) -> None:
+    jaw = HeadAnimation([0.0, 1.0, 2.0], ("jawOpen",), [[0.0], [1.0], [0.0]])
+    save_glb(generic, tmp_path / "head.glb", animation=jaw)
+    found = play(tmp_path / "head.glb", [0.0, 1.0])
+    assert found.complaints == []
+    assert all(mesh["names"] == list(generic.unit_names) for mesh in found.meshes)
+    closed, open_ = (frame.picture for frame in found.frames)
+    rows, columns = np.nonzero(np.abs(open_ - closed).max(axis=-1) > 20)
+    assert len(rows) > 1000
+    height, width, _ = closed.shape
+    assert np.percentile(rows, 5) > 0.5 * height, "what opens lies in the lower half"
+    assert abs(columns.mean() / width - 0.5) < 0.02, "and in the middle"
+
+
 def test_three_js_shows_each_expressions_texture(
     small_head: Head,
     nod: HeadAnimation,

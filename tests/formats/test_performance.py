@@ -13,6 +13,7 @@ from mien.errors import InputError
 from mien.expressions.state import FaceState, Gaze, PosedFace
 from mien.formats.gltf import glb_bytes, save_glb
 from mien.formats.performance import performance
+from mien.formats.surface import target_offsets
 from mien.model.head import Head
 from mien.numeric.rotation import rotation_from_vector
 
@@ -78,6 +79,23 @@ def test_the_file_moves_as_the_rig_does(
             assert np.linalg.norm(found - expected, axis=-1).max() < 0.012
 
 
+def test_a_long_performance_comes_in_batches(
+    puppet: Puppet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moments = [moment(time) for time in np.arange(40) / 24]
+    whole = performance(puppet.head, moments, puppet.evaluate)
+    monkeypatch.setattr("mien.formats.performance._BATCH", 7)
+    parts = performance(puppet.head, iter(moments), puppet.evaluate)
+    assert len(whole.shapes) <= len(parts.shapes) <= len(whole.shapes) + 2
+    for animation in (whole, parts):
+        targets = target_offsets(puppet.head) | animation.shapes
+        shapes = np.stack([targets[name] for name in animation.target_names])
+        for row, played in zip(animation.weights, moments, strict=True):
+            found = puppet.head.mesh.vertices + np.tensordot(row, shapes, axes=1)
+            missed = found - puppet.evaluate(played.state).vertices
+            assert np.linalg.norm(missed, axis=1).max() <= 0.1 + 1e-9
+
+
 def test_units_and_whole_expressions_keep_name_and_weight(puppet: Puppet) -> None:
     animation = performance(puppet.head, [moment(time) for time in TIMES], puppet.evaluate)
     assert animation.target_names[:2] == ("jawOpen", "joy")
@@ -130,6 +148,8 @@ def test_an_expression_with_a_units_name_is_told_apart(puppet: Puppet) -> None:
 def test_bad_input_is_named(puppet: Puppet) -> None:
     with pytest.raises(InputError, match="moments: expected at least one, got none"):
         performance(puppet.head, [], puppet.evaluate)
+    with pytest.raises(InputError, match="tolerance_mm: expected a number above zero, got 0"):
+        performance(puppet.head, [moment(0)], puppet.evaluate, tolerance_mm=0)
     back = [moment(0.5), moment(0.25)]
     with pytest.raises(InputError, match="times: expected each later"):
         performance(puppet.head, back, puppet.evaluate)

@@ -7,12 +7,14 @@ moves along.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
 
 import numpy as np
 
 from mien.animate.timeline import Moment
-from mien.arrays import Array, Float
+from mien.arrays import Array, Float, check_positive
 from mien.errors import InputError
 from mien.expressions.state import FACE, FaceState, PosedFace
 from mien.formats.head_animation import HeadAnimation
@@ -21,6 +23,8 @@ from mien.model.head import NEUTRAL, Head
 
 MOTION = "motion"
 """The further shapes are called motion_1, motion_2, …"""
+
+_BATCH = 128  # frames
 
 
 def performance(
@@ -39,25 +43,27 @@ def performance(
         moments: in the order of their times, one for each frame.
         evaluate: the rig's.
         tolerance_mm: how far any vertex may be from the rig's at these times.
-    Raises: InputError: no moment, times that do not ascend.
+    Raises: InputError: no moment, times that do not ascend, a tolerance of 0 or less.
     """
     offsets = target_offsets(head)
-    played, weights, missed = [], [], []
-    for moment in moments:
-        row = _named_weights(head, moment.state)
-        moved = evaluate(moment.state).vertices - head.mesh.vertices
-        for target, weight in row.items():
-            moved = moved - weight * offsets[target]
-        played.append(moment)
-        weights.append(row)
-        missed.append(moved.astype(np.float32))
+    played, weights = [], []
+    shapes = _Shapes(check_positive("tolerance_mm", tolerance_mm), head.mesh.vertices.shape)
+    for batch in _batches(moments):
+        rows = [_named_weights(head, moment.state) for moment in batch]
+        moved = [evaluate(moment.state).vertices - head.mesh.vertices for moment in batch]
+        for row, missed in zip(rows, moved, strict=True):
+            for target, weight in row.items():
+                missed -= weight * offsets[target]
+        shapes.cover(np.stack(moved))
+        played += batch
+        weights += rows
     if not played:
         raise InputError("moments", "at least one", "none")
-    motion, shapes = _fewest_shapes(np.stack(missed), tolerance_mm)
     names = tuple(dict.fromkeys(target for row in weights for target in row))
     named = np.array([[row.get(target, 0.0) for target in names] for row in weights])
     rotations, translations = _head_motion(played)
-    further = {f"{MOTION}_{index}": shape for index, shape in enumerate(shapes, 1)}
+    motion, moving = shapes.result()
+    further = {f"{MOTION}_{index}": shape for index, shape in enumerate(moving, 1)}
     return HeadAnimation(
         times=np.array([moment.time for moment in played]),
         target_names=(*names, *further),
@@ -78,25 +84,41 @@ def _named_weights(head: Head, state: FaceState) -> dict[str, float]:
     return {target: weight for target, weight in weights.items() if weight}
 
 
-def _fewest_shapes(
-    motion: Float[Array, "t v 3"], tolerance: float
-) -> tuple[Float[Array, "t k"], Float[Array, "k v 3"]]:
-    """Weights in [-1, 1] and shapes whose sums come within tolerance of the motion.
+class _Shapes:
+    """Few shapes whose weighted sums come within a tolerance of every frame shown to it.
 
-    The shapes are the motion's principal components about rest, taken until all is reached.
+    Frames come in batches, so that a long performance never lies in memory. Of what the shapes so
+    far miss in a batch, its principal components about rest are taken until nothing is missed.
     """
-    left = motion.reshape(len(motion), -1)
-    _, vectors = np.linalg.eigh((left @ left.T).astype(np.float64))
-    weights, shapes = np.zeros((len(motion), 0)), np.zeros((0, *motion.shape[1:]))
-    for vector in vectors.T[::-1]:
-        if np.linalg.norm(left.reshape(motion.shape), axis=-1).max(initial=0.0) <= tolerance:
-            break
-        shape = vector @ left
-        left = left - np.outer(vector, shape).astype(np.float32)
-        largest = np.abs(vector).max()
-        weights = np.column_stack([weights, vector / largest])
-        shapes = np.concatenate([shapes, (largest * shape).reshape(1, *motion.shape[1:])])
-    return weights, shapes
+
+    def __init__(self, tolerance: float, shape: tuple[int, ...]) -> None:
+        self._tolerance, self._shape = tolerance, shape
+        self._directions = np.zeros((0, math.prod(shape)))  # orthonormal
+        self._weights: list[Array] = []
+
+    def cover(self, frames: Float[Array, "t v 3"]) -> None:
+        flat = frames.reshape(len(frames), -1)
+        left = flat - (flat @ self._directions.T) @ self._directions
+        while np.linalg.norm(left.reshape(frames.shape), axis=-1).max(initial=0) > self._tolerance:
+            _, vectors = np.linalg.eigh(left @ left.T)
+            direction = vectors[:, -1] @ left
+            direction /= np.linalg.norm(direction)
+            left -= np.outer(left @ direction, direction)
+            self._directions = np.vstack([self._directions, direction])
+        self._weights += list(flat @ self._directions.T)
+
+    def result(self) -> tuple[Float[Array, "t k"], Float[Array, "k v 3"]]:
+        """Weights in [-1, 1], and the shapes in mm."""
+        count = len(self._directions)
+        weights = np.array([np.pad(row, (0, count - len(row))) for row in self._weights])
+        largest = np.abs(weights).max(axis=0)
+        return weights / largest, (largest * self._directions.T).T.reshape(-1, *self._shape)
+
+
+def _batches(moments: Iterable[Moment]) -> Iterator[list[Moment]]:
+    iterator = iter(moments)
+    while batch := list(islice(iterator, _BATCH)):
+        yield batch
 
 
 def _head_motion(
