@@ -1,0 +1,87 @@
+"""Draws the picture of docs/face-units.md: python -m tools.draw_units HEAD.
+
+HEAD is a head folder, made by `mien build`. Every unit is shown at weight 1: the face from the
+front, and where it moves from nearby and from the side.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from mien.arrays import Array, Float, UInt8
+from mien.assets.generic import GenericHead, load_generic_head
+from mien.camera import Camera
+from mien.expressions.contacts import Mechanics, fit_units
+from mien.formats.head_folder import load_head
+from mien.model.head import ATLAS, Head
+from mien.render.shade import render
+
+PICTURE = Path(__file__).parents[1] / "docs" / "images" / "face-units.jpg"
+_TILE = (200, 240)
+_COLUMNS = 6
+_DISTANCE_MM = 900.0
+_BACKGROUND = (60, 60, 68)
+_WITH = {"mouthClose": {"jawOpen": 1.0}, "tongueOut": {"jawOpen": 0.3}}
+"""What a unit is shown with that by itself shows nothing, or what cannot be."""
+
+
+def main(folder: str) -> None:
+    """Writes the picture."""
+    head, generic = load_head(Path(folder)), load_generic_head()
+    tiles = list(_tiles(head, generic))
+    tiles += [np.zeros_like(tiles[0])] * (-len(tiles) % _COLUMNS)
+    rows = [np.hstack(tiles[at : at + _COLUMNS]) for at in range(0, len(tiles), _COLUMNS)]
+    Image.fromarray(np.vstack(rows)).save(PICTURE, quality=82, optimize=True)
+
+
+def _tiles(head: Head, generic: GenericHead) -> Iterable[UInt8[Array, "h w 3"]]:
+    neutral = np.array(head.mesh.vertices)
+    units = fit_units(generic, neutral)
+    mechanics = Mechanics.of(generic, neutral, units)
+    eyes, mouth = _middles(generic, neutral)
+    for name in generic.unit_names:
+        weights = {name: 1.0, **_WITH.get(name, {})}
+        added = [weight * units[generic.unit_names.index(key)] for key, weight in weights.items()]
+        posed = mechanics.applied(neutral + sum(added), weights)
+        upper = name.startswith(("eye", "brow", "cheekSquint", "noseSneer"))
+        side = 35.0 if name.endswith("Left") else -35.0
+        front = _look_at((eyes + mouth) / 2, width_mm=190)
+        near = _look_at(eyes if upper else mouth, width_mm=135 if upper else 110, yaw=side)
+        faces = [_picture(head, posed, camera) for camera in (front, near)]
+        yield _labelled(np.hstack(faces), " + ".join(weights))
+
+
+def _middles(generic: GenericHead, vertices: Float[Array, "v 3"]) -> tuple[Array, Array]:
+    """(3,) mm: between the eyes, and the mouth's middle."""
+    eyes = [generic.vertex_of(f"{side}_eye_inner") for side in ("left", "right")]
+    mouth = [generic.vertex_of(f"{side}_mouth_corner") for side in ("left", "right")]
+    return vertices[eyes].mean(axis=0), vertices[mouth].mean(axis=0) - [0, 12, 0]
+
+
+def _look_at(target: Float[Array, " 3"], *, width_mm: float, yaw: float = 0.0) -> Camera:
+    """A camera before the target that sees this width; positive yaw: the subject's left side."""
+    c, s = np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
+    rotation = np.diag([1.0, -1.0, -1.0]) @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+    place = np.array([0, 0, _DISTANCE_MM]) - rotation @ target
+    return Camera(*_TILE, _TILE[0] * _DISTANCE_MM / width_mm, rotation, place)
+
+
+def _picture(head: Head, vertices: Float[Array, "v 3"], camera: Camera) -> UInt8[Array, "h w 3"]:
+    mesh = head.mesh.with_vertices(vertices)
+    image = render(mesh, camera, head.textures[ATLAS], samples=9, background=_BACKGROUND)
+    return image[..., :3]
+
+
+def _labelled(image: UInt8[Array, "h w 3"], text: str) -> Array:
+    picture = Image.fromarray(image)
+    ImageDraw.Draw(picture).text((6, 4), text, fill=(255, 255, 255), stroke_width=1, stroke_fill=0)
+    return np.asarray(picture)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
