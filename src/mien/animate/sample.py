@@ -1,0 +1,9 @@
+"""The performance that ships with mien: units alone, so that any head can give it."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+SAMPLE_TIMELINE = Path(str(files("mien.assets"))) / "data" / "sample_timeline.json"
+"""Ten seconds: a silent sentence, a look around, a smile, raised brows; blinking and breathing."""
