@@ -9,6 +9,7 @@ import trimesh
 
 from mien.errors import InputError
 from mien.formats.export import export_head
+from mien.formats.head_animation import HeadAnimation
 from mien.model.head import Head
 
 
@@ -34,6 +35,24 @@ def test_units_can_be_left_out(small_head: Head, tmp_path: Path) -> None:
     data = (tmp_path / "head.glb").read_bytes()
     assert b"jawOpen" not in data
     assert b"joy" in data
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".usdz"])
+def test_what_moves(small_head: Head, nod: HeadAnimation, tmp_path: Path, suffix: str) -> None:
+    if suffix == ".usdz":
+        pytest.importorskip("pxr", reason="usd-core is not installed")
+    for name, animation in (("still", None), ("moving", nod)):
+        export_head(small_head, tmp_path / f"{name}{suffix}", animation=animation)
+    still, moving = (tmp_path / f"{name}{suffix}" for name in ("still", "moving"))
+    assert moving.stat().st_size > still.stat().st_size
+
+
+def test_what_a_kind_cannot_hold(small_head: Head, nod: HeadAnimation, tmp_path: Path) -> None:
+    export_head(small_head, tmp_path / "joy.obj", expression="joy")
+    with pytest.raises(InputError, match=r"head\.obj: expected a \.glb or \.usdz .* moves"):
+        export_head(small_head, tmp_path / "head.obj", animation=nod)
+    with pytest.raises(InputError, match=r"joy\.glb: expected an \.obj for joy alone, got \.glb"):
+        export_head(small_head, tmp_path / "joy.glb", expression="joy")
 
 
 def test_an_error_leaves_the_old_file(small_head: Head, tmp_path: Path) -> None:

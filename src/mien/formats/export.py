@@ -6,32 +6,46 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mien.errors import InputError
-from mien.model.head import Head
+from mien.formats.head_animation import HeadAnimation
+from mien.model.head import NEUTRAL, Head
 
 
 def export_head(
-    head: Head, path: str | Path, *, parts: Iterable[str] | None = None, units: bool = True
+    head: Head,
+    path: str | Path,
+    *,
+    parts: Iterable[str] | None = None,
+    units: bool = True,
+    expression: str = NEUTRAL,
+    animation: HeadAnimation | None = None,
 ) -> None:
     """Write the head as .glb, .obj (with .mtl and .png beside it) or .usdz.
 
     Args:
         parts: names of the mesh's parts; by default all but the hair cap and the lashes.
         units: with the face units as morph targets; an .obj cannot hold any.
-    Raises: InputError: another suffix, an unknown part, a place that cannot be written;
-        for .usdz that usd-core is not installed.
+        expression: which one an .obj shows; the other kinds hold all of them.
+        animation: how the head moves; an .obj cannot.
+    Raises: InputError: another suffix, an unknown part or expression, what this kind of file
+        cannot hold, a place that cannot be written; for .usdz that usd-core is not installed.
     """
     suffix = Path(path).suffix.lower()
+    if suffix not in (".glb", ".obj", ".usdz"):
+        raise InputError(path, "a name that ends in .glb, .obj or .usdz", suffix or "no suffix")
+    if suffix == ".obj":
+        from mien.formats.obj import save_obj
+
+        if animation is not None:
+            raise InputError(path, "a .glb or .usdz for a head that moves", suffix)
+        save_obj(head, path, parts=parts, expression=expression)
+        return
+    if expression != NEUTRAL:
+        raise InputError(path, f"an .obj for {expression} alone", f"{suffix}, which holds all")
     if suffix == ".glb":
         from mien.formats.gltf import save_glb
 
-        save_glb(head, path, parts=parts, units=units)
-    elif suffix == ".obj":
-        from mien.formats.obj import save_obj
-
-        save_obj(head, path, parts=parts)
-    elif suffix == ".usdz":
+        save_glb(head, path, parts=parts, units=units, animation=animation)
+    else:
         from mien.formats.usd import save_usdz
 
-        save_usdz(head, path, parts=parts, units=units)
-    else:
-        raise InputError(path, "a name that ends in .glb, .obj or .usdz", suffix or "no suffix")
+        save_usdz(head, path, parts=parts, units=units, animation=animation)
