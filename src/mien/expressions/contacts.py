@@ -41,19 +41,17 @@ class Contacts:
 
     def resolved(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
         """(V, 3) mm with every contact resolved; the same array where there is none."""
-        apart = resolve_lips(self.lips, vertices)
-        moves = np.zeros_like(vertices) if apart is None else apart
-        touched = apart is not None
-        for lids in self.lids:
-            moved = resolve_lids(lids, vertices)
+        parted = resolve_lips(self.lips, vertices)
+        lifted = [(lids, resolve_lids(lids, vertices)) for lids in self.lids]
+        if parted is None and all(moved is None for _, moved in lifted):
+            return vertices
+        moves = np.zeros_like(vertices) if parted is None else parted
+        for lids, moved in lifted:
             if moved is not None:
                 moves[lids.vertices] += moved
-                touched = True
-        if not touched:
-            return vertices
         moves[self.followers.vertices] = self.followers.carried(moves)
-        resolved: Array = vertices + moves
-        return resolved
+        moves += vertices
+        return moves
 
 
 @dataclass(frozen=True)

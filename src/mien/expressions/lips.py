@@ -21,6 +21,8 @@ _DEEPEST_MM = 6.0
 _TOLERANCE_MM = 0.05
 _STEP = 0.6
 """Share of its depth by which a vertex gives way in a round; the other lip does so too."""
+_STEEPEST = 0.5
+"""The way up counts as no longer than twice the nearest way out."""
 _ROUNDS = 6
 
 
@@ -34,6 +36,7 @@ class Lip:
         tested: (T,) those that can get into the other lip.
         spread: (P, T) how far a correction of a tested vertex goes along; 1 at itself.
         allowed: (T,) mm, how deep each is in the other lip when the face is neutral.
+        upwards: 1 for the upper lip, -1 for the lower: where it gives way to.
     """
 
     vertices: Int[Array, " p"]
@@ -42,6 +45,7 @@ class Lip:
     tested: Int[Array, " t"]
     spread: Float[Array, "p t"]
     allowed: Float[Array, " t"]
+    upwards: float
 
 
 @dataclass(frozen=True)
@@ -61,8 +65,8 @@ class Lips:
         )
         distance, nearest = distances_from(edges, np.concatenate([upper, lower[1:-1]]))
         first, second = (
-            _lip(generic, edges, np.where(np.isin(nearest, line[1:-1]), distance, np.inf))
-            for line in (upper, lower)
+            _lip(generic, edges, np.where(np.isin(nearest, line[1:-1]), distance, np.inf), upwards)
+            for line, upwards in ((upper, 1.0), (lower, -1.0))
         )
         first_depth, second_depth = _depths(first, second, vertices)
         return Lips(_allowing(first, first_depth), _allowing(second, second_depth))
@@ -77,8 +81,9 @@ def resolve_lips(
 ) -> Float[Array, "v 3"] | None:
     """(V, 3) mm that takes the lips out of each other; None where they are not in each other.
 
-    In every round each vertex that is in the other lip is moved towards the nearest place on it,
-    and the skin around goes along.
+    In every round vertices of the upper lip that are in the lower one give way upwards, those of
+    the lower lip downwards, and the skin around goes along. (The nearest way out may lead through
+    the front of the other lip.)
     """
     upper, lower = lips.upper, lips.lower
     places = above, below = vertices[upper.vertices], vertices[lower.vertices]
@@ -130,7 +135,9 @@ def _apart(lips: Lips, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
     return vertices
 
 
-def _lip(generic: GenericHead, edges: csr_matrix, distance: Float[Array, " v"]) -> Lip:
+def _lip(
+    generic: GenericHead, edges: csr_matrix, distance: Float[Array, " v"], upwards: float
+) -> Lip:
     """The lip of the vertices within reach of its inner edge."""
     mesh = generic.mesh
     skin = mesh.triangles[mesh.triangles_of("skin")]
@@ -147,6 +154,7 @@ def _lip(generic: GenericHead, edges: csr_matrix, distance: Float[Array, " v"]) 
         tested=frozen(tested),
         spread=frozen(_spreading(edges, vertices, tested)),
         allowed=frozen(np.zeros(len(tested))),
+        upwards=upwards,
     )
 
 
@@ -193,8 +201,9 @@ def _ways_out(
     deep = np.flatnonzero(depth - lip.allowed[among] > _TOLERANCE_MM)
     corners = others[other.triangles[triangle[deep]]]
     nearest = (weights[deep][..., None] * corners).sum(axis=1)
-    share = _STEP * (1 - lip.allowed[among[deep]] / depth[deep])
-    ways[among[deep]] = share[:, None] * (nearest - points[deep])
+    rise = lip.upwards * (nearest - points[deep])[:, 1] / depth[deep]
+    excess = depth[deep] - lip.allowed[among[deep]]
+    ways[among[deep], 1] = lip.upwards * _STEP * excess / np.maximum(rise, _STEEPEST)
     return ways
 
 
