@@ -115,3 +115,39 @@ def test_a_missing_encoder_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setitem(video._ENCODERS, ".mp4", ("h264_of_nobody", "h264_of_none"))
     with pytest.raises(InputError, match="PyAV with the encoder h264_of_nobody or h264_of_none"):
         write_video(tmp_path / "clip.mp4", frames(1), 25)
+
+
+def read_alpha(path: Path) -> list[np.ndarray]:
+    """Frames by libvpx's own decoder: FFmpeg's built-in one leaves alpha out."""
+    decoder = av.CodecContext.create("libvpx-vp9", "r")
+    with av.open(path) as container:
+        packets = [packet for packet in container.demux(video=0) if packet.size]
+        found = [frame for packet in packets for frame in decoder.decode(packet)]
+    return [frame.to_ndarray(format="rgba") for frame in found]
+
+
+def test_alpha_comes_back_from_a_webm(tmp_path: Path) -> None:
+    ramp = np.linspace(0, 255, 96).astype(np.uint8)
+    given = [
+        np.dstack([frame, np.tile(np.roll(ramp, 8 * i), (64, 1))])
+        for i, frame in enumerate(frames(7))
+    ]
+    assert write_video(tmp_path / "clip.webm", iter(given), 25) == 7
+    with av.open(tmp_path / "clip.webm") as container:
+        assert container.streams.video[0].metadata["alpha_mode"] == "1", "for browsers"
+    found = read_alpha(tmp_path / "clip.webm")
+    assert len(found) == 7
+    for actual, expected in zip(found, given, strict=True):
+        difference = np.abs(actual[..., 3].astype(int) - expected[..., 3])
+        assert np.median(difference) <= 2
+        assert np.mean(difference > 12) < 0.05, "but for the step from opaque to clear"
+    seen = read(tmp_path / "clip.webm")[0]
+    assert np.abs(seen[8, 12].astype(int) - given[0][8, 12, :3]).max() <= 6
+
+
+def test_alpha_wants_a_webm(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"clip\.mp4: expected a \.webm for pictures with alpha"):
+        write_video(tmp_path / "clip.mp4", [np.zeros((8, 8, 4), np.uint8)], 25)
+    mixed = [np.zeros((8, 8, 4), np.uint8), np.zeros((8, 8, 3), np.uint8)]
+    with pytest.raises(InputError, match=r"frame 1: expected 8x8 px with alpha as the first"):
+        write_video(tmp_path / "clip.webm", mixed, 25)

@@ -20,8 +20,13 @@ from mien.formats.atomic import atomic_file
 _ENCODERS = {".mp4": ("libx264", "libopenh264"), ".webm": ("libvpx-vp9",)}
 _CONTAINER_OPTIONS = {".mp4": {"movflags": "+faststart"}, ".webm": {}}
 
-# libvpx wants no bit rate where quality rules, and is slow where it is not told to hurry.
+# libvpx wants no bit rate where quality rules, and is slow where it is not told to hurry. With
+# alpha it must not use alternate reference frames, which the two streams would not share.
 _TUNING = {"libvpx-vp9": {"b": "0", "cpu-used": "4", "row-mt": "1"}}
+_ALPHA_TUNING = {"auto-alt-ref": "0"}
+
+# By channels of a frame; a player that knows no alpha shows the same picture without.
+_PIXELS = {3: "yuv420p", 4: "yuva420p"}
 
 # FFmpeg's numbers: BT.709 for matrix, primaries and transfer; 16 to 235 for luma. Players take a
 # file that does not say for one or the other by its size, and shift its colours.
@@ -30,7 +35,7 @@ _BT709, _LIMITED_RANGE = 1, 1
 
 def write_video(
     path: str | Path,
-    frames: Iterable[UInt8[Array, "h w 3"]],
+    frames: Iterable[UInt8[Array, "h w c"]],
     fps: float,
     *,
     quality: int = 18,
@@ -39,13 +44,14 @@ def write_video(
 
     Args:
         path: .mp4 (H.264) or .webm (VP9).
-        frames: (h, w, 3) sRGB, all of one size, taken one at a time. An odd side is made even by
-            repeating its last row or column: colour at half resolution wants pairs.
+        frames: (h, w, 3) sRGB, or for .webm (h, w, 4) with alpha last, not premultiplied; all of
+            one size, taken one at a time. An odd side is made even by repeating its last row or
+            column: colour at half resolution wants pairs.
         fps: frames a second.
         quality: the encoder's constant rate factor; lower is better and larger, 18 looks exact.
     Returns: how many frames were written.
-    Raises: InputError: another suffix, no frame, a frame of another size, no encoder in this build
-        of FFmpeg, a place that cannot be written.
+    Raises: InputError: another suffix, no frame, a frame of another size, alpha into an .mp4, no
+        encoder in this build of FFmpeg, a place that cannot be written.
     """
     import av
 
@@ -58,19 +64,24 @@ def write_video(
     first = next(remaining, None)
     if first is None:
         raise InputError(path, "at least one frame to write", "none")
-    height, width = check_image("frame 0", first).shape[:2]
+    shape = _check_frame(first, 0, None)
+    height, width, channels = shape
+    if channels == 4 and suffix != ".webm":
+        raise InputError(path, "a .webm for pictures with alpha", suffix)
     options = _CONTAINER_OPTIONS[suffix]
     with (
         atomic_file(path) as temporary,
         av.open(temporary, "w", format=suffix[1:], container_options=options) as container,
     ):
         tuning = {"crf": str(quality)} | _TUNING.get(encoder, {})
+        tuning |= _ALPHA_TUNING if channels == 4 else {}
         stream: Any = container.add_stream(encoder, rate, tuning)
         stream.width, stream.height = width + width % 2, height + height % 2
+        stream.codec_context.pix_fmt = _PIXELS[channels]
         _declare_color(stream)
         count = 0
         for frame in chain([first], remaining):
-            _check_size(frame, count, (height, width))
+            _check_frame(frame, count, shape)
             container.mux(stream.encode(_to_yuv(frame)))
             count += 1
         container.mux(stream.encode(None))
@@ -88,23 +99,34 @@ def _find_encoder(path: str | Path, names: tuple[str, ...]) -> str:
 
 def _declare_color(stream: Any) -> None:
     context = stream.codec_context
-    context.pix_fmt = "yuv420p"
     context.colorspace = context.color_primaries = context.color_trc = _BT709
     context.color_range = _LIMITED_RANGE
 
 
-def _check_size(frame: object, index: int, size: tuple[int, int]) -> None:
-    found = check_image(f"frame {index}", frame).shape[:2]
-    if found != size:
-        height, width = size
-        raise InputError(
-            f"frame {index}", f"{width}x{height} px as the first", f"{found[1]}x{found[0]} px"
-        )
+def _check_frame(
+    frame: object, index: int, expected: tuple[int, int, int] | None
+) -> tuple[int, int, int]:
+    """The shape of a frame, which is as expected."""
+    name = f"frame {index}"
+    pixels = np.asarray(frame)
+    channels = 4 if pixels.ndim == 3 and pixels.shape[2] == 4 else 3
+    height, width = check_image(name, pixels[..., :3] if channels == 4 else pixels).shape[:2]
+    found = (height, width, channels)
+    if expected not in (None, found):
+        raise InputError(name, f"{_told(expected)} as the first", _told(found))
+    return found
 
 
-def _to_yuv(frame: UInt8[Array, "h w 3"]) -> Any:
+def _told(shape: tuple[int, int, int] | None) -> str:
+    assert shape is not None
+    height, width, channels = shape
+    return f"{width}x{height} px{' with alpha' if channels == 4 else ''}"
+
+
+def _to_yuv(frame: UInt8[Array, "h w c"]) -> Any:
     import av
 
-    height, width = frame.shape[:2]
+    height, width, channels = frame.shape
     even = np.pad(frame, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-    return av.VideoFrame.from_ndarray(even).reformat(format="yuv420p", dst_colorspace=_BT709)
+    picture = av.VideoFrame.from_ndarray(even, format={3: "rgb24", 4: "rgba"}[channels])
+    return picture.reformat(format=_PIXELS[channels], dst_colorspace=_BT709)
