@@ -63,8 +63,17 @@ def test_a_moment_says_what_the_face_does() -> None:
     )
     state = timeline.at(1.0).state
     assert state.units == {"jawOpen": 1.7}, "nothing is clamped here"
-    assert state.expressions == {"mouth": {"joy": 0.6}, "face": {"anger": -0.2}}
+    assert state.expressions["face"] == {"anger": -0.2}
     assert (state.gaze.yaw, state.gaze.pitch) == (0.1, 0.0)
+
+
+def test_regions_add_to_what_is_around_them() -> None:
+    tracks = {"face.joy": 0.6, "mouth.joy": -0.2, "mouth.anger": 0.3, "left_mouth.anger": 0.1}
+    state = Timeline(1.0, tracks={name: constant(v) for name, v in tracks.items()}).at(0).state
+    assert state.expressions.keys() == {"face", "mouth", "left_mouth"}
+    assert state.expressions["face"] == {"joy": 0.6}
+    assert state.expressions["mouth"] == pytest.approx({"joy": 0.4, "anger": 0.3})
+    assert state.expressions["left_mouth"] == pytest.approx({"joy": 0.4, "anger": 0.4})
 
 
 def test_the_head_turns_about_the_pivot() -> None:

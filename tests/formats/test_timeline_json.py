@@ -107,6 +107,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"trakcs": {}}, "trakcs: unknown key 'trakcs'; did you mean tracks?"),
     ({"tracks": []}, "tracks: expected an object, found a list"),
     ({"tracks": {"muoth": {}}}, "tracks.muoth: unknown key 'muoth'; did you mean mouth?"),
+    ({"tracks": {"left_eyes": {}}}, "unknown key 'left_eyes'; did you mean left_eye"),
     ({"tracks": {"head": {"yav": 1}}}, "tracks.head.yav: unknown key 'yav'; did you mean yaw?"),
     ({"tracks": {"units": {"jawOpen": "x"}}}, "tracks.units.jawOpen: expected a number, a list of"),
     ({"tracks": keys()}, "tracks.mouth.joy.keys: expected at least one key, found none"),

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from mien.arrays import Array, Float
 from mien.errors import InputError
-from mien.expressions.state import FaceState, Gaze
+from mien.expressions.state import FACE, FaceState, Gaze
 
 HEAD, GAZE, UNITS = "head", "gaze", "units"
 """Groups of channels besides the regions. A channel's name is GROUP.NAME: `units.jawOpen`."""
@@ -14,11 +14,21 @@ HEAD, GAZE, UNITS = "head", "gaze", "units"
 MEMBERS = {HEAD: ("yaw", "pitch", "roll", "x", "y", "z"), GAZE: ("yaw", "pitch")}
 ANGLES = frozenset(f"{group}.{name}" for group in MEMBERS for name in ("yaw", "pitch", "roll"))
 
-REGIONS = (
-    "face",
-    *(side + part for part in ("mouth", "eyes", "forehead") for side in ("", "left_", "right_")),
-)
-"""Where weights of photographed expressions can hold. `left_eyes` is the left eye's region."""
+AROUND: Mapping[str, tuple[str, ...]] = {
+    FACE: (),
+    "mouth": (FACE,),
+    "eyes": (FACE,),
+    "forehead": (FACE,),
+    "left_mouth": (FACE, "mouth"),
+    "right_mouth": (FACE, "mouth"),
+    "left_eye": (FACE, "eyes"),
+    "right_eye": (FACE, "eyes"),
+    "left_forehead": (FACE, "forehead"),
+    "right_forehead": (FACE, "forehead"),
+}
+"""The regions in which weights of photographed expressions can hold, and those around each."""
+
+REGIONS = tuple(AROUND)
 
 
 def split(channel: str) -> tuple[str, str]:
@@ -30,17 +40,29 @@ def split(channel: str) -> tuple[str, str]:
 
 
 def to_state(values: Mapping[str, float]) -> FaceState:
-    """The face that these values by channel describe; what they leave out is at rest."""
+    """The face that these values by channel describe; what they leave out is at rest.
+
+    Weights of a region come on top of those of the regions around it (`left_mouth` on `mouth` on
+    `face`), so that a motion of the mouth can be added to any face and fades in without a jump.
+    """
     units: dict[str, float] = {}
-    expressions: dict[str, dict[str, float]] = {}
+    own: dict[str, dict[str, float]] = {}
     for channel, value in values.items():
         group, name = split(channel)
         if group == UNITS:
             units[name] = float(value)
         elif group not in MEMBERS:
-            expressions.setdefault(group, {})[name] = float(value)
+            own.setdefault(group, {})[name] = float(value)
     gaze = Gaze(float(values.get("gaze.yaw", 0)), float(values.get("gaze.pitch", 0)))
-    return FaceState(expressions, units, gaze)
+    return FaceState({region: _with_surroundings(own, region) for region in own}, units, gaze)
+
+
+def _with_surroundings(own: Mapping[str, Mapping[str, float]], region: str) -> dict[str, float]:
+    total: dict[str, float] = {}
+    for name in (*AROUND.get(region, (FACE,)), region):
+        for expression, weight in own.get(name, {}).items():
+            total[expression] = total.get(expression, 0.0) + weight
+    return total
 
 
 def head_rotation(yaw: float, pitch: float, roll: float) -> Float[Array, "3 3"]:
