@@ -12,9 +12,9 @@ from mien.assets.generic import GenericHead
 from mien.expressions.margins import distances_from, fading, full_path, skin_edges
 from mien.numeric.inside import depths_below
 
-_PATCH_MM = 16.0
+_PATCH_MM = 14.0
 """Skin so near to the line where the lips meet is lip, front and back."""
-_TESTED_MM = 10.0
+_TESTED_MM = 8.0
 _SPREAD_MM = 6.0
 """How far a correction of one vertex goes along."""
 _DEEPEST_MM = 6.0
@@ -23,7 +23,7 @@ _STEP = 0.6
 """Share of its depth by which a vertex gives way in a round; the other lip does so too."""
 _STEEPEST = 0.5
 """The way up counts as no longer than twice the nearest way out."""
-_ROUNDS = 6
+_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -90,12 +90,12 @@ def resolve_lips(
     up, down = _ways_out(upper, above, lower, below), _ways_out(lower, below, upper, above)
     if not (up.any() or down.any()):
         return None
-    # What goes deeper than is allowed at first is what the lips are pressed by.
-    hit_up, hit_down = (np.flatnonzero(ways.any(axis=1)) for ways in (up, down))
+    # Where nothing touches and nothing moves, nothing will touch.
+    near_up, near_down = _around(upper, up), _around(lower, down)
     for _ in range(rounds):
         above, below = above + _spread(upper, up), below + _spread(lower, down)
-        up = _ways_out(upper, above, lower, below, hit_up)
-        down = _ways_out(lower, below, upper, above, hit_down)
+        up = _ways_out(upper, above, lower, below, near_up)
+        down = _ways_out(lower, below, upper, above, near_down)
         if not (up.any() or down.any()):
             break
     moved = np.zeros_like(vertices)
@@ -205,6 +205,13 @@ def _ways_out(
     excess = depth[deep] - lip.allowed[among[deep]]
     ways[among[deep], 1] = lip.upwards * _STEP * excess / np.maximum(rise, _STEEPEST)
     return ways
+
+
+def _around(lip: Lip, ways: Float[Array, "t 3"]) -> Int[Array, " n"]:
+    """The tested vertices that go along with those that give way."""
+    hit = ways.any(axis=1)
+    near: Array = np.flatnonzero(lip.spread[lip.tested][:, hit].any(axis=1))
+    return near
 
 
 def _spread(lip: Lip, ways: Float[Array, "t 3"]) -> Float[Array, "p 3"]:
