@@ -1,4 +1,5 @@
-"""Which frames of a clip make good photos of a head: sharp, alike in expression, unlike in pose."""
+"""Which frames of a clip make good photos of a head at rest: sharp, alike in expression, unlike in
+pose."""
 
 from __future__ import annotations
 
@@ -14,8 +15,12 @@ MAX_YAW = np.radians(50)
 
 # Gaze follows the head and moves nothing that matters; "_neutral" is constant.
 _SHAPED = np.array([name[0] != "_" and not name.startswith("eyeLook") for name in BLENDSHAPE_NAMES])
-_COMMON_SHARE = 0.1
+_OF_MOUTH = np.array([name.startswith(("mouth", "jaw", "cheekPuff")) for name in BLENDSHAPE_NAMES])
 _SAME_EXPRESSION = 0.6
+_OPEN_LIPS = 4.0
+"""What lips that are apart by the distance of the eyes cost, in scores."""
+_RESTLESS = 0.2
+"""How much less at rest a frame may be than the one most at rest."""
 _SHARP_SHARE = 0.5
 _SAME_POSE = np.radians(3)
 
@@ -29,19 +34,21 @@ class FrameScores:
         sharpness: any measure that grows with it.
         pose: yaw and pitch in radians.
         blendshapes: the detector's scores.
+        lips_apart: gap between the lips over the distance of the eyes.
     """
 
     index: Int[Array, " n"]
     sharpness: Float[Array, " n"]
     pose: Float[Array, "n 2"]
     blendshapes: Float[Array, "n 52"]
+    lips_apart: Float[Array, " n"]
 
 
 def choose_frames(scores: FrameScores, count: int) -> Int[Array, " m"]:
     """Rows of `scores`, at most `count`, in the clip's order; at least one.
 
-    Among frames that are sharp and near the clip's commonest expression, begins with the most
-    frontal one and goes on to whichever pose is farthest from all chosen so far, taking the
+    Among frames that are sharp and show the face at rest, begins with the most frontal one and goes
+    on to whichever pose is farthest from all chosen so far, taking the
     sharpest frame near that pose, until every pose left is within 3 degrees of a chosen one.
     """
     usable = _usable(scores)
@@ -61,23 +68,37 @@ def choose_frames(scores: FrameScores, count: int) -> Int[Array, " m"]:
 
 
 def _usable(scores: FrameScores) -> Int[Array, " m"]:
-    """Rows within reach of the detector, alike in expression, and sharp for their kind."""
+    """Rows within reach of the detector, at rest, and sharp for their kind."""
     frontal = np.abs(scores.pose[:, 0]) <= MAX_YAW
     rows = np.flatnonzero(frontal if frontal.any() else np.ones_like(frontal))
-    rows = rows[expression_distance(scores.blendshapes[rows]) <= _SAME_EXPRESSION]
+    unrest = _unrest(scores)[rows]
+    most = int(unrest.argmin())
+    alike = expression_distance(scores.blendshapes[rows], most) <= _SAME_EXPRESSION
+    rows = rows[alike & (unrest <= unrest[most] + _RESTLESS)]
+    return sharp_rows(scores, rows)
+
+
+def sharp_rows(scores: FrameScores, rows: Int[Array, " n"]) -> Int[Array, " m"]:
+    """Those of the rows that are not blurred beside the others."""
     sharpness = scores.sharpness[rows]
     sharp: Array = rows[sharpness >= _SHARP_SHARE * np.median(sharpness)]
     return sharp
 
 
-def expression_distance(blendshapes: Float[Array, "n 52"]) -> Float[Array, " n"]:
-    """How far each frame's expression is from the commonest: 0.2 is alike, 1.5 a broad smile.
+def _unrest(scores: FrameScores) -> Float[Array, " n"]:
+    """How far each frame is from a face at rest.
 
-    The commonest is the frame with the nearest tenth of the clip closest around it.
+    A mouth at rest is closed. What brows and eyes do at rest differs between people, as do the
+    scores that the detector gives for it: it is what they do most of the time.
     """
+    upper, mouth = scores.blendshapes[:, _SHAPED & ~_OF_MOUTH], scores.blendshapes[:, _OF_MOUTH]
+    usual = np.linalg.norm(upper - np.median(upper, axis=0), axis=1)
+    unrest: Array = usual + np.linalg.norm(mouth, axis=1) + _OPEN_LIPS * scores.lips_apart
+    return unrest
+
+
+def expression_distance(blendshapes: Float[Array, "n 52"], row: int) -> Float[Array, " n"]:
+    """How far each frame's expression is from that of one: 0.2 is alike, 1.5 a broad smile."""
     shaped = blendshapes[:, _SHAPED]
-    apart = np.linalg.norm(shaped[:, None] - shaped[None], axis=2)
-    neighbour = int(_COMMON_SHARE * (len(shaped) - 1))
-    commonest = int(np.sort(apart, axis=1)[:, neighbour].argmin())
-    distances: Array = apart[commonest]
+    distances: Array = np.linalg.norm(shaped - shaped[row], axis=1)
     return distances

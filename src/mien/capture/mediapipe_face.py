@@ -20,6 +20,7 @@ from mien.errors import MienError
 
 LANDMARK_COUNT = 478
 RIGHT_IRIS, LEFT_IRIS = 468, 473
+UPPER_LIP, LOWER_LIP = 13, 14
 MAX_FACES = 8
 
 BLENDSHAPE_NAMES = (
@@ -102,6 +103,13 @@ class DetectedFace:
     def width(self) -> float:
         """Extent in px along the wider image axis."""
         return float(np.ptp(self.points[:, :2], axis=0).max())
+
+    @property
+    def lips_apart(self) -> float:
+        """Gap between the lips over the distance of the eyes."""
+        gap = self.points[UPPER_LIP, :2] - self.points[LOWER_LIP, :2]
+        eyes = self.points[RIGHT_IRIS, :2] - self.points[LEFT_IRIS, :2]
+        return float(np.linalg.norm(gap) / max(float(np.linalg.norm(eyes)), 1e-6))
 
 
 def yaw_pitch(R_cam_head: Float[Array, "3 3"]) -> tuple[float, float]:

@@ -14,7 +14,6 @@ from mien.capture.detector import NO_FACE, LandmarkDetector, NoFaceError
 from mien.capture.duplicates import same_photo
 from mien.capture.folder import (
     ANNOTATIONS,
-    NEUTRAL,
     ignored_files,
     orphaned_annotations,
     photo_files,
@@ -81,6 +80,7 @@ def load_capture(
     max_side: int = MAX_SIDE,
     face: int | None = None,
     frames: int = 7,
+    expressions: int | None = None,
     names: AnnotationNames | None = None,
     progress: Progress | None = None,
 ) -> Capture:
@@ -95,7 +95,8 @@ def load_capture(
         max_side: larger photos are reduced to this many px on the longer side.
         face: which face to take where there are several, from left to right from 1; None takes
             the largest.
-        frames: how many frames of a video to use at most.
+        frames: how many frames of a video to use at most for the face at rest.
+        expressions: how many other expressions of a video at most; None takes those that differ.
         names: what annotations may name; None takes the generic head's names.
         progress: told after every photo or frame.
     Raises:
@@ -107,18 +108,18 @@ def load_capture(
     with LandmarkDetector() as detector:
         reader = _Reader(detector, max_side, face, names, progress)
         if source.is_file() and source.suffix.lower() in VIDEO_SUFFIXES:
-            expressions = reader.from_video(source, frames)
+            found = reader.from_video(source, frames, expressions)
         else:
-            expressions = reader.from_photos(source)
-    expressions = {name: views for name, views in expressions.items() if views}
-    if not expressions:
+            found = reader.from_photos(source)
+    found = {name: views for name, views in found.items() if views}
+    if not found:
         reasons = [note for note in reader.notes if "left out" in note]
         raise EstimationError(
             f"{source}: no photo shows a face that can be used ({'; '.join(reasons[:3])})"
         )
-    notes = (*reader.notes, *_viewpoint_notes(expressions))
+    notes = (*reader.notes, *_viewpoint_notes(found))
     name = source.stem if source.is_file() else source.resolve().name
-    return Capture(name, expressions, notes)
+    return Capture(name, found, notes)
 
 
 class _Reader:
@@ -154,20 +155,26 @@ class _Reader:
             expressions[expression] = self._settled(views)
         return expressions
 
-    def from_video(self, source: Path, count: int) -> dict[str, tuple[View, ...]]:
-        """The chosen frames as the one expression `neutral`."""
-        photos, notes = pick_frames(
+    def from_video(
+        self, source: Path, count: int, expressions: int | None
+    ) -> dict[str, tuple[View, ...]]:
+        """The chosen frames by expression."""
+        picked = pick_frames(
             source,
             count=count,
+            expressions=expressions,
             detector=self.detector,
             max_side=self.max_side,
             progress=self.progress,
         )
-        self.notes += [f"{source.name}: {note}" for note in notes]
-        views: list[View] = []
-        for photo in photos:
-            self._add(views, photo, None)
-        return {NEUTRAL: self._settled(views)}
+        self.notes += [f"{source.name}: {note}" for note in picked.notes]
+        found = {}
+        for name, photos in picked.expressions.items():
+            views: list[View] = []
+            for photo in photos:
+                self._add(views, photo, None)
+            found[name] = self._settled(views)
+        return found
 
     def _add(self, views: list[View], photo: Photo, annotations: Annotations | None) -> None:
         """The photo as another view, unless its face is of no use or it is there already."""

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mien.arrays import Array, UInt8, check_positive
+from mien.arrays import Array, Int, UInt8, check_positive
 from mien.capture.detector import LandmarkDetector
+from mien.capture.expression_choice import choose_expressions, name_expressions
 from mien.capture.files import check_readable, kind_of, one_line
+from mien.capture.folder import NEUTRAL
 from mien.capture.frame_choice import FrameScores, choose_frames
 from mien.capture.mediapipe_face import DetectedFace, yaw_pitch
 from mien.capture.photos import MAX_PIXELS, MAX_SIDE, Photo, shrunk
@@ -139,23 +141,38 @@ def _frames_in(container: InputContainer, rate: float) -> int:
     return round(container.duration / 1e6 * rate) if container.duration else 0
 
 
+@dataclass(frozen=True)
+class PickedFrames:
+    """What a clip gives for a head.
+
+    Attributes:
+        expressions: photos by expression, "neutral" first. Photos are called `frame_000123.png` by
+            the frame's number from 0.
+        notes: what was odd.
+    """
+
+    expressions: dict[str, tuple[Photo, ...]]
+    notes: tuple[str, ...]
+
+
 def pick_frames(
     path: str | Path,
     *,
     count: int = 7,
+    expressions: int | None = None,
     detector: LandmarkDetector,
     max_side: int = MAX_SIDE,
     progress: Callable[[int, int], None] | None = None,
-) -> tuple[tuple[Photo, ...], tuple[str, ...]]:
-    """Sharp frames with diverse poses of the head and a like expression, and notes.
+) -> PickedFrames:
+    """Sharp frames with diverse poses of the head at rest, and one of each other expression.
 
     The clip is decoded twice: once to judge up to 240 frames (10 a second at most), once to fetch
     the chosen ones, so that memory stays small however long and large it is.
 
     Args:
-        count: as many at most; fewer when the head turns little.
+        count: of neutral as many at most; fewer when the head turns little.
+        expressions: as many others at most; None takes what differs, up to 8; 0 neutral alone.
         progress: told (done, total) frames of both passes; the total is an estimate.
-    Returns: photos named `frame_000123.png` by the frame's number from 0, and what was odd.
     Raises:
         InputError: no such file, not readable, `count` not positive.
         FileFormatError: not a video, or no frame in it.
@@ -165,12 +182,33 @@ def pick_frames(
     video = Video(Path(path))
     report = _two_passes(progress, video.length()[0])
     scores = _judge(video, detector, report)
-    wanted = scores.index[choose_frames(scores, count)]
-    photos = tuple(_fetch(video, set(wanted.tolist()), max_side, report))
-    yaw = np.degrees(scores.pose[np.isin(scores.index, wanted), 0])
-    span = f"the head turns by {np.ptp(yaw):.0f} degrees in them"
-    video.notes.append(f"{len(photos)} of {len(scores.index)} judged frames chosen: {span}")
-    return photos, tuple(video.notes)
+    rows = _choose_rows(scores, count, expressions)
+    wanted = {int(scores.index[row]) for chosen in rows.values() for row in chosen}
+    photos = dict(_fetch(video, wanted, max_side, report))
+    picked = {
+        name: tuple(photos[index] for index in scores.index[chosen].tolist() if index in photos)
+        for name, chosen in rows.items()
+    }
+    neutral = rows[NEUTRAL]
+    span = f"the head turns by {np.degrees(np.ptp(scores.pose[neutral, 0])):.0f} degrees in them"
+    video.notes.append(f"{len(neutral)} of {len(scores.index)} judged frames chosen: {span}")
+    others = [name for name in rows if name != NEUTRAL]
+    if others:
+        video.notes.append(f"{len(others)} other expressions chosen: {', '.join(others)}")
+    return PickedFrames(picked, tuple(video.notes))
+
+
+def _choose_rows(
+    scores: FrameScores, count: int, expressions: int | None
+) -> dict[str, Int[Array, " n"]]:
+    """Rows of the scores by expression."""
+    neutral = choose_frames(scores, count)
+    at_rest = int(neutral[np.abs(scores.pose[neutral]).sum(axis=1).argmin()])
+    others = choose_expressions(scores, at_rest, expressions)
+    names = name_expressions(scores.blendshapes[others], scores.blendshapes[at_rest])
+    return {NEUTRAL: neutral} | {
+        name: np.array([row]) for name, row in zip(names, others, strict=True)
+    }
 
 
 def _two_passes(
@@ -215,6 +253,7 @@ def _judge(
         np.array([sharpness for _, sharpness, _ in rows]),
         np.array([yaw_pitch(face.R_cam_head) for face in faces]),
         np.array([face.blendshapes for face in faces]),
+        np.array([face.lips_apart for face in faces]),
     )
 
 
@@ -234,8 +273,8 @@ def _sharpness(pixels: UInt8[Array, "h w 3"], face: DetectedFace) -> float:
 
 def _fetch(
     video: Video, wanted: set[int], max_side: int, report: Callable[[int, int], None]
-) -> Iterator[Photo]:
-    """The wanted frames as photos."""
+) -> Iterator[tuple[int, Photo]]:
+    """The wanted frames as photos, with their numbers."""
     last = max(wanted)
     for frame in video.frames():
         report(1, frame.index)
@@ -243,6 +282,7 @@ def _fetch(
             pixels = frame.pixels()
             size = pixels.shape[1], pixels.shape[0]
             name = f"frame_{frame.index:06d}.png"
-            yield Photo(name, video.path, shrunk(pixels, max_side), original_size=size)
+            photo = Photo(name, video.path, shrunk(pixels, max_side), original_size=size)
+            yield frame.index, photo
         if frame.index == last:
             return

@@ -57,6 +57,12 @@ class Features:
         seen: Array = np.asarray(np.isfinite(self.sigma_mm))
         return seen
 
+    @property
+    def on_edges(self) -> Bool[Array, " n"]:
+        """(N,) landmarks on something that can be seen."""
+        on_edges: Array = np.isin(self.names, [f"landmark {number}" for number in ON_EDGES])
+        return on_edges
+
     def on(self, vertices: Float[Array, "... v 3"]) -> Float[Array, "... n 3"]:
         """Where the features lie on a head (or on each of a stack of offset fields), mm."""
         places: Array = np.einsum(

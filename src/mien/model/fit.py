@@ -15,8 +15,10 @@ from mien.capture.source import View
 from mien.errors import EstimationError
 from mien.model.deform import eye_centers
 from mien.model.features import gather_features
-from mien.model.landmark_fit import FitOptions, Solution, solve_by_features
+from mien.model.guide import guide_features
+from mien.model.landmark_fit import FitOptions, Solution, residuals_of, solve_by_features
 from mien.model.registration import register_solution
+from mien.model.resection import place_cameras
 from mien.model.verdict import (
     HOPELESS_SIGMAS,
     PhotoFit,
@@ -24,9 +26,15 @@ from mien.model.verdict import (
     find_misfit,
     judge_marks,
     name_notes,
+    view_spread,
 )
 
 __all__ = ["Fit", "FitOptions", "fit_views"]
+
+ONE_SIDE_DEG = 10.0
+"""Photos from within so much, as landmarks alone have it, tell no depth."""
+NEARER_TELLS = 1.3
+"""Unless one is taken from so many times the distance of another: perspective tells it, too."""
 
 Progress = Callable[[int, int], None]
 
@@ -90,10 +98,12 @@ def _fit_views(
         left_out[solution.views[worst].photo.name] = why
         marked = [view for k, view in enumerate(solution.views) if k != worst]
     if options.dense and options.adjust:
-        solution = register_solution(solution, faceless, generic, progress)
+        solution = _all_photos(solution, faceless, generic, options, progress)
         left_out |= solution.problems
     else:
         left_out |= {view.photo.name: NO_FACE for view in faceless}
+    if options.adjust:
+        solution = _guided(solution, generic)
     vertices, cameras = _in_head_space(solution, generic, options)
     sigma_px = solution.features.sigma_px(solution.cameras)
     photos = {}
@@ -103,6 +113,45 @@ def _fit_views(
         photos[view.photo.name] = PhotoFit(camera, marks, matches, rms_px)
     notes = (*depth_notes(cameras), *solution.notes, *name_notes(photos))
     return Fit(vertices, photos, left_out, solution.uncertainty_mm, notes)
+
+
+def _all_photos(
+    solution: Solution,
+    faceless: Sequence[View],
+    generic: GenericHead,
+    options: FitOptions,
+    progress: Progress | None,
+) -> Solution:
+    """The solution by the skin that the photos share; where they look from one side, one's own."""
+    if faceless or len(solution.views) == 1 or not _from_one_side(solution.cameras):
+        return register_solution(solution, faceless, generic, progress)
+    # Depth would be noise. The photo that tells most by itself gives the shape.
+    best = int(np.nansum(1 / solution.features.sigma_mm, axis=1).argmax())
+    view = solution.views[best]
+    alone = solve_by_features([view], gather_features([view], generic), generic, options)
+    focal = np.full(len(solution.views), alone.cameras[0].focal_px)
+    cameras = place_cameras(solution.views, solution.features, focal, alone.vertices)
+    cameras = tuple(alone.cameras[0] if k == best else item for k, item in enumerate(cameras))
+    return replace(
+        solution, cameras=cameras, vertices=alone.vertices, uncertainty_mm=alone.uncertainty_mm
+    )
+
+
+def _from_one_side(cameras: Sequence[Camera]) -> bool:
+    """Whether nothing tells depth: neither another side nor another distance."""
+    distance = np.array([float(camera.t_cam_head[2]) for camera in cameras])
+    near = distance.max() / distance.min() < NEARER_TELLS
+    return bool(near) and view_spread(cameras) < ONE_SIDE_DEG
+
+
+def _guided(solution: Solution, generic: GenericHead) -> Solution:
+    """The solution with eyelids and lips where landmarks show them."""
+    features, cameras = solution.features, solution.cameras
+    vertices = guide_features(
+        solution.vertices, features, cameras, generic, measured=bool(solution.matches)
+    )
+    residuals = residuals_of(features, cameras, vertices)
+    return replace(solution, vertices=vertices, residuals=residuals)
 
 
 def _misfit(

@@ -117,14 +117,19 @@ def depth_notes(cameras: Sequence[Camera]) -> tuple[str, ...]:
     """What the user should know when the viewpoints do not tell depth."""
     if len(cameras) == 1:
         return ("one photo: depth comes from the prior of faces, not from this person",)
-    axes = np.stack([camera.center / np.linalg.norm(camera.center) for camera in cameras])
-    spread = float(np.degrees(np.arccos(np.clip(axes @ axes.T, -1, 1)).max()))
+    spread = view_spread(cameras)
     if spread < MIN_PARALLAX_DEG:
         return (
             f"all photos come from within {spread:.0f} degrees: depth comes from the prior of "
             f"faces, not from this person ({MIN_PARALLAX_DEG:.0f} degrees or more would show it)",
         )
     return ()
+
+
+def view_spread(cameras: Sequence[Camera]) -> float:
+    """Degrees between the two directions farthest apart from which cameras look at the head."""
+    axes = np.stack([camera.center / np.linalg.norm(camera.center) for camera in cameras])
+    return float(np.degrees(np.arccos(np.clip(axes @ axes.T, -1, 1)).max()))
 
 
 def name_notes(photos: Mapping[str, PhotoFit]) -> tuple[str, ...]:

@@ -210,7 +210,7 @@ def _height_problem(generic: GenericHead) -> _HeightProblem:
     triangles = skin[~inner[skin].any(axis=1)]
     outer = np.zeros(len(vertices), bool)
     outer[triangles] = True
-    laplacian, areas = _laplacian(vertices, triangles)
+    laplacian, areas = cotangent_laplacian(vertices, triangles)
     spring = np.where(outer, np.sqrt(BENDING * areas) / _REACH_MM**2, 1.0)
     root = csr_matrix(
         vstack([np.sqrt(BENDING) * diags(1 / np.sqrt(areas)) @ laplacian, diags(spring)])
@@ -218,7 +218,7 @@ def _height_problem(generic: GenericHead) -> _HeightProblem:
     return _HeightProblem(outer, csr_matrix(root.T @ root), root)
 
 
-def _laplacian(vertices: Array, triangles: Array) -> tuple[Any, Array]:
+def cotangent_laplacian(vertices: Array, triangles: Array) -> tuple[Any, Array]:
     """Cotangent Laplacian (V, V) and each vertex's area, mm^2."""
     from scipy.sparse import csr_matrix, diags
 

@@ -1,0 +1,46 @@
+"""Where the eyes look in a photo, from the irises' centres."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.assets.generic import GenericHead
+from mien.camera import Camera
+from mien.capture.mediapipe_face import LEFT_IRIS, RIGHT_IRIS
+from mien.capture.source import View
+
+EYEBALLS = {"left_eyeball": LEFT_IRIS, "right_eyeball": RIGHT_IRIS}
+MOST_RAD = np.deg2rad(45.0)
+"""No eye turns farther."""
+
+
+def iris_directions(
+    view: View, camera: Camera, vertices: Float[Array, "v 3"], generic: GenericHead
+) -> Float[Array, "2 3"] | None:
+    """(2, 3) unit vectors from the centres of the left and the right eyeball to their irises.
+
+    The ray through an iris' centre meets its eyeball there; one that misses the ball grazes it.
+    None where no landmarks are.
+    """
+    if view.landmarks is None:
+        return None
+    directions = np.empty((2, 3))
+    for row, (name, iris) in enumerate(EYEBALLS.items()):
+        ball = vertices[np.unique(generic.mesh.triangles[generic.mesh.triangles_of(name)])]
+        centre = ball.mean(axis=0)
+        radius = float(np.linalg.norm(ball - centre, axis=1).max())
+        ray = camera.ray_directions(view.landmarks.points[iris][None])[0]
+        towards = centre - camera.center
+        along = float(towards @ ray)
+        off = towards - along * ray
+        reach = np.sqrt(max(radius**2 - float(off @ off), 0.0))
+        to_iris = (along - reach) * ray - towards
+        directions[row] = to_iris / np.linalg.norm(to_iris)
+    return directions
+
+
+def yaw_pitch_of(directions: Float[Array, "n 3"]) -> Float[Array, "n 2"]:
+    """Radians to the subject's left, and up."""
+    x, y, z = directions.T
+    return np.column_stack([np.arctan2(x, z), np.arcsin(np.clip(y, -1, 1))])
