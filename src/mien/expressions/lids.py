@@ -25,6 +25,7 @@ _REACH_MM = 14.0
 _BALL_MM = 18.0
 """Skin further off the eyeball has nothing to do with it."""
 _ALLOWED = 1e-6
+_ROUNDS = 4
 _STEPS = (0.25, 0.5, 0.75, 1.0)
 
 
@@ -131,8 +132,10 @@ class Lids:
     ) -> Float[Array, " l"]:
         """(L,) what corrections along the upper edge are elsewhere on both lids."""
         upper, _ = self.edges(places)
-        along: Array = np.interp(places[:, 0], _rising(upper[:, 0]), corrections) * self.share
-        return along
+        along: Array = np.interp(places[:, 0], _rising(upper[:, 0]), corrections)
+        # Close to a corner the edge doubles back, and its longitude tells no place on it.
+        along[: self.upper] = corrections
+        return along * self.share
 
 
 def close_lids(
@@ -147,12 +150,11 @@ def close_lids(
     result = np.asarray(units, np.float64).copy()
     for side in SIDES:
         lids = Lids.of(generic, vertices, side)
-        rest = vertices[lids.vertices]
         for unit, offsets in enumerate(result):
             if not np.abs(offsets[lids.vertices]).max() > 0:
                 continue
             if generic.unit_names[unit] == f"eyeBlink{side.capitalize()}":
-                offsets[lids.vertices] = _closed(lids, vertices + offsets) - rest
+                offsets[lids.vertices] += _closing(lids, vertices + offsets)
             for weight in _STEPS:
                 posed = vertices + weight * offsets
                 places = lids.places(posed)
@@ -161,9 +163,10 @@ def close_lids(
     return result
 
 
-def _closed(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
-    """The lids with the upper edge laid along the lower one, just over and before it."""
-    places = lids.places(vertices)
+def _closing(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
+    """(L, 3) mm that lays the upper edge along the lower one, just over and before it."""
+    before = lids.places(vertices)
+    places = before.copy()
     places[:, 2] = np.maximum(places[:, 2], lids.least)
     down = lids.overlap(places) - lids.full_overlap
     places[:, 1] += lids.spread(places, down) * lids.on_upper
@@ -171,7 +174,8 @@ def _closed(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
     wanted = np.interp(upper[:, 0], _rising(lower[:, 0]), lower[:, 2])
     wanted += lids.full_overlap * (_IN_FRONT_MM / _OVERLAP_MM)
     places[:, 2] += lids.spread(places, wanted - upper[:, 2]) * lids.on_upper
-    return lids.at(places)
+    moved: Array = lids.at(places) - lids.at(before)
+    return moved
 
 
 def _lift(lids: Lids, places: Float[Array, "l 3"]) -> Float[Array, "l 3"]:
@@ -204,15 +208,17 @@ def resolve_lids(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3
     """
     shift = vertices[lids.eyeball.vertices].mean(axis=0) - lids.eyeball.centre
     places = lids.places(vertices - shift) if shift.any() else lids.places(vertices)
-    too_far = lids.overlap(places) - lids.full_overlap
-    apart = bool((too_far < _ALLOWED).all())
-    if apart and not (places[:, 2] < lids.least - _ALLOWED).any():
-        return None
     resolved = places.copy()
-    if not apart:
+    for _ in range(_ROUNDS):
+        too_far = lids.overlap(resolved) - lids.full_overlap
+        if (too_far < _ALLOWED).all():
+            break
         # Either lid gives way by half.
-        back = lids.spread(places, np.maximum(too_far, 0.0)) / 2
+        back = lids.spread(resolved, np.maximum(too_far, 0.0)) / 2
         resolved[:, 1] += np.where(lids.on_upper, back, -back)
-    resolved[:, 2] = np.maximum(resolved[:, 2], lids.least)
+    inside = resolved[:, 2] < lids.least - _ALLOWED
+    resolved[inside, 2] = lids.least[inside]
+    if np.array_equal(resolved, places):
+        return None
     moved: Array = lids.at(resolved) - lids.at(places)
     return moved

@@ -75,6 +75,11 @@ class Lips:
         """mm by which the tested vertices of both lips are in the other one; 0 outside."""
         return np.concatenate(_depths(self.upper, self.lower, vertices))
 
+    @property
+    def allowed(self) -> Float[Array, " t"]:
+        """mm, the depths of the neutral face."""
+        return np.concatenate([self.upper.allowed, self.lower.allowed])
+
 
 def resolve_lips(
     lips: Lips, vertices: Float[Array, "v 3"], *, rounds: int = _ROUNDS

@@ -1,0 +1,55 @@
+"""Heads and their face units, each computed once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from mien.arrays import Array
+from mien.assets.generic import load_generic_head
+from mien.expressions.contacts import Mechanics, fit_units
+from mien.expressions.transfer import transfer_units
+from people import person
+
+
+@dataclass(frozen=True)
+class Rigged:
+    """A head, its units before and after contacts were resolved, and its mechanics."""
+
+    neutral: Array
+    transferred: Array
+    units: Array
+    mechanics: Mechanics
+
+    def posed(self, **weights: float) -> Array:
+        """(V, 3) mm: the units added up, nothing else."""
+        names = load_generic_head().unit_names
+        added = [weight * self.units[names.index(name)] for name, weight in weights.items()]
+        vertices: Array = self.neutral + np.sum(added, axis=0)
+        return vertices
+
+    def living(self, **weights: float) -> Array:
+        """(V, 3) mm: with turning eyes and contacts."""
+        return self.mechanics.applied(self.posed(**weights), weights)
+
+
+def both(name: str, weight: float = 1.0) -> dict[str, float]:
+    """A unit on either side of the face."""
+    return {f"{name}Left": weight, f"{name}Right": weight}
+
+
+@pytest.fixture(scope="session", params=["generic", "person 0", "person 1"])
+def rigged(request: pytest.FixtureRequest) -> Rigged:
+    """The generic head and two persons whose skin is a little rough, as fitted skin is."""
+    generic = load_generic_head()
+    vertices = np.array(generic.mesh.vertices)
+    if request.param != "generic":
+        seed = int(request.param[-1])
+        bumps = np.random.default_rng(seed).normal(size=(8, 2, 3))
+        waves = np.sin(vertices @ (bumps[:, 0].T / 12)) @ bumps[:, 1] * 0.1
+        vertices = person(seed) + waves
+    units = fit_units(generic, vertices)
+    mechanics = Mechanics.of(generic, vertices, units)
+    return Rigged(vertices, transfer_units(generic, vertices), units, mechanics)
