@@ -58,10 +58,11 @@ def test_breathing_is_small_slow_and_goes_on() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Blink(period=0), "period: expected a number above zero"),
+        (lambda: Blink(period=0), "period: expected a number of seconds from 0.1 up"),
+        (lambda: Blink(closed=0), "closed: expected at least 1e-06 s, got 0"),
         (lambda: Blink(jitter=1.5), "jitter: expected a share from 0 to 0.9, got 1.5"),
         (lambda: Blink(period=0.3), "period: expected blinks shorter than the pause"),
-        (lambda: Breathing(period=-1), "period: expected a number above zero"),
+        (lambda: Breathing(period=-1), "period: expected a number of seconds from 0.1 up"),
         (lambda: Breathing(rise=float("nan")), "rise, tip and sway: expected finite numbers"),
     ],
 )

@@ -127,6 +127,10 @@ BAD: list[tuple[dict[str, Any], str]] = [
         {"tracks": keys([float("nan"), 1])},
         "tracks.mouth.joy.keys[0].time: expected a finite number, found nan",
     ),
+    (
+        {"tracks": keys([0, 1e300])},
+        "keys[0].value: expected a number above -1e+09 and at most 1e+09",
+    ),
     ({"tracks": keys([10**400, 1])}, "keys[0].time: expected a finite number, found inf"),
     ({"tracks": keys([1, 2, 3])}, "tracks.mouth.joy.keys[0]: expected [time, value], found 3"),
     ({"tracks": keys({"time": 1})}, "tracks.mouth.joy.keys[0].value: missing"),
@@ -145,7 +149,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ),
     (
         {"play": [{"clip": "a", "at": 0, "speed": 0}], "clips": {"a": {"duration": 1}}},
-        "play[0].speed: expected a number above 0, found 0",
+        "play[0].speed: expected a number above 0 and at most 1e+09, found 0",
     ),
     ({"clips": {"a": {}}}, "clips.a.duration: missing"),
     (
@@ -154,7 +158,10 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ),
     ({"layers": [{"generator": "blnk"}]}, "layers[0].generator: unknown generator 'blnk'; did you"),
     ({"layers": [BREATH | {"closing": 1}]}, "layers[0].closing: unknown key 'closing'"),
-    ({"layers": [BREATH | {"period": -1}]}, "layers[0].period: expected a number above zero"),
+    (
+        {"layers": [BREATH | {"period": -1}]},
+        "layers[0].period: expected a number of seconds from 0.1 up",
+    ),
     ({"layers": [BREATH | {"seed": 1.5}]}, "layers[0].seed: expected a whole number"),
     ({"layers": [{"name": 3}]}, "layers[0].name: expected text, found a number"),
 ]

@@ -11,6 +11,9 @@ from mien.arrays import Array, Float, check_array, frozen
 from mien.errors import InputError
 
 Interpolation = Literal["cubic", "linear", "hold"]
+MIN_STEP = 1e-6
+"""Seconds between two keys, at least: a shorter step would be as steep as no number can say."""
+
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
 
@@ -41,7 +44,7 @@ class Curve:
         count = len(times)
         if not count:
             raise InputError("times", "at least one key", "none")
-        if (falls := np.flatnonzero(np.diff(times) <= 0)).size:
+        if (falls := np.flatnonzero(np.diff(times) < MIN_STEP)).size:
             index = int(falls[0]) + 1
             expected = f"a time after {times[index - 1]:g} s"
             raise InputError(f"times[{index}]", expected, f"{times[index]:g} s")
@@ -130,10 +133,10 @@ def _auto_slopes(times: Array, values: Array, holds: Array) -> Array:
     spans = np.diff(times)
     steep = np.where(holds[:-1], 0.0, np.diff(values) / spans)
     before, after = steep[:-1], steep[1:]
-    same_way = before * after > 0
+    product = before * after
     near, far = 2 * spans[1:] + spans[:-1], spans[1:] + 2 * spans[:-1]
-    inverse = near / np.where(same_way, before, 1.0) + far / np.where(same_way, after, 1.0)
-    slopes[1:-1] = np.where(same_way, (near + far) / inverse, 0.0)
+    weighted = np.where(product > 0, near * after + far * before, 1.0)
+    slopes[1:-1] = np.where(product > 0, (near + far) * product / weighted, 0.0)
     return slopes
 
 

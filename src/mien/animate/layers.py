@@ -7,9 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mien.animate.curves import Curve
-from mien.arrays import Array, check_array, check_positive
+from mien.animate.curves import MIN_STEP, Curve
+from mien.arrays import Array, check_array
 from mien.errors import InputError
+
+MIN_PERIOD = 0.1
+"""Seconds: nobody blinks or breathes faster, and a shorter one would ask for endless keys."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +25,7 @@ class Blink:
         closing, closed, opening: seconds that the lids take to fall, stay and rise.
         amount: how far they fall; 1 closes them.
         seed: another one gives other times.
-    Raises: InputError: a duration of 0 or less, blinks that would overlap, a jitter out of range.
+    Raises: InputError: a duration that is none, blinks that would overlap, a jitter out of range.
     """
 
     period: float = 4.0
@@ -34,8 +37,10 @@ class Blink:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("period", "closing", "closed", "opening"):
-            check_positive(name, getattr(self, name))
+        _check_period(self.period)
+        for name in ("closing", "closed", "opening"):
+            if not getattr(self, name) >= MIN_STEP:
+                raise InputError(name, f"at least {MIN_STEP:g} s", getattr(self, name))
         check_array("amount", self.amount, ())
         _check_share("jitter", self.jitter)
         length = self.closing + self.closed + self.opening
@@ -66,7 +71,7 @@ class Breathing:
         rise: mm by which breathing in lifts the head. tip: radians by which it tips it back.
         sway: radians of slow turning and leaning, slower than the breath.
         seed: another one gives another motion.
-    Raises: InputError: a period of 0 or less, a jitter out of range, NaN.
+    Raises: InputError: a period below MIN_PERIOD, a jitter out of range, NaN.
     """
 
     period: float = 4.2
@@ -77,7 +82,7 @@ class Breathing:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        check_positive("period", self.period)
+        _check_period(self.period)
         _check_share("jitter", self.jitter)
         check_array("rise, tip and sway", (self.rise, self.tip, self.sway), (3,))
 
@@ -110,6 +115,11 @@ def _events(rng: np.random.Generator, duration: float, period: float, jitter: fl
     gaps = period * (1 + jitter * rng.uniform(-1, 1, count))
     starts: Array = np.append(0.0, np.cumsum(gaps))
     return starts[: max(2, int(np.searchsorted(starts, duration)) + 1)]
+
+
+def _check_period(period: float) -> None:
+    if not MIN_PERIOD <= period < np.inf:
+        raise InputError("period", f"a number of seconds from {MIN_PERIOD:g} up", period)
 
 
 def _check_share(name: str, share: float) -> None:

@@ -12,6 +12,9 @@ from typing import Any, NoReturn
 from mien.errors import FileFormatError, InputError
 from mien.formats.head_json import Broken
 
+LARGEST = 1e9
+"""No document means larger numbers, and sums and products of these stay exact enough."""
+
 
 def read_json(path: str | Path) -> dict[str, Any]:
     """The object in a JSON file.
@@ -74,7 +77,7 @@ def as_choice(value: object, place: str, kind: str, names: Collection[str]) -> s
 
 
 def as_number(
-    value: object, place: str, *, above: float = -math.inf, most: float = math.inf
+    value: object, place: str, *, above: float = -LARGEST, most: float = LARGEST
 ) -> float:
     """A finite number, above and at most these limits. Raises: Broken."""
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -86,12 +89,12 @@ def as_number(
     if not math.isfinite(number):
         raise Broken(place, f"expected a finite number, found {number}")
     if not above < number <= most:
-        limit = f"above {above:g}" + ("" if math.isinf(most) else f" and at most {most:g}")
-        raise Broken(place, f"expected a number {limit}, found {number:g}")
+        limits = f"above {above:g} and at most {most:g}"
+        raise Broken(place, f"expected a number {limits}, found {number:g}")
     return number
 
 
-def as_whole(value: object, place: str, *, above: float = -math.inf, most: float = math.inf) -> int:
+def as_whole(value: object, place: str, *, above: float = -LARGEST, most: float = LARGEST) -> int:
     """A whole number. Raises: Broken."""
     if isinstance(value, bool) or not isinstance(value, int):
         complain(place, "a whole number", value)

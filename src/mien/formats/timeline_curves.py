@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mien.animate.curves import INTERPOLATIONS, Curve, constant
+from mien.animate.curves import INTERPOLATIONS, MIN_STEP, Curve, constant
 from mien.formats.head_json import Broken
 from mien.formats.strict_json import as_choice, as_list, as_number, as_object, complain, need
 
@@ -32,7 +32,7 @@ def curve_from_json(value: object, place: str) -> Curve:
     for index, key in enumerate(keys):
         where = f"{place}.keys[{index}]"
         row = _key(key, where, usual)
-        if rows and row[0] <= rows[-1][0]:
+        if rows and row[0] - rows[-1][0] < MIN_STEP:
             before = f"{rows[-1][0]:g} s of the key before"
             raise Broken(f"{where}.time", f"expected a time after the {before}, found {row[0]:g} s")
         rows.append(row)
