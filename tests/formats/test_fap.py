@@ -56,6 +56,16 @@ def test_one_mm_is_1024_over_the_unit() -> None:
         assert meter.read(moved)[item.number - 1] == expected, item.name
 
 
+def test_parameters_that_go_one_way_are_never_negative() -> None:
+    meter = FapMeter.of(NEUTRAL)
+    up_and_back = meter.read(NEUTRAL + [0.0, 1.0, -1.0])
+    down = meter.read(NEUTRAL - [0.0, 1.0, 0.0])
+    for name in ("open_jaw", "thrust_jaw"):
+        assert up_and_back[BY_NAME[name]] == 0
+    for name in ("lift_l_cheek", "lift_r_cheek"):
+        assert down[BY_NAME[name]] == 0
+
+
 def test_larger_faces_have_the_same_parameters() -> None:
     small, large = FapMeter.of(NEUTRAL), FapMeter.of(1.7 * NEUTRAL)
     for name in ("jawOpen", "mouthSmileLeft", "eyeBlinkRight", "browInnerUp", "eyeLookDownLeft"):

@@ -1,6 +1,6 @@
 """The 68 facial animation parameters of MPEG-4, and where on the mesh each is measured.
 
-Source: ISO/IEC 14496-2 annex C; the feature points' places on our mesh are our choice, listed in
+Source: ISO/IEC 14496-2 annex C, table C-1; the feature points' places on our mesh are our choice, listed in
 docs/animation.md.
 """
 
@@ -97,6 +97,8 @@ _ROWS: tuple[tuple[int, str, str, tuple[int, int], str], ...] = (
     (68, "pull_r_ear", "right_ear.3", RIGHT, "ENS"),
 )
 
+_ONE_WAY = frozenset(("open_jaw", "thrust_jaw", "lift_l_cheek", "lift_r_cheek"))
+
 PARAMETERS: tuple[Parameter, ...] = tuple(
     Parameter(
         number,
@@ -106,7 +108,7 @@ PARAMETERS: tuple[Parameter, ...] = tuple(
         unit,
         # The jaw carries the chin along; the parameter means what the chin does by itself.
         relative_to=JAW if name == "depress_chin" else (),
-        one_way=name in ("open_jaw", "thrust_jaw"),
+        one_way=name in _ONE_WAY,
     )
     for number, name, points, direction, unit in _ROWS
 )
