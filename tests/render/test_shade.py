@@ -7,7 +7,7 @@ from mien.errors import InputError
 from mien.mesh import Mesh
 from mien.render.mipmap import build_pyramids
 from mien.render.mix import painted
-from mien.render.shade import CLAY, Light, over_background, rasterize_mesh, render
+from mien.render.shade import CLAY, Light, over_background, render
 from shapes import RADII, camera_at, ellipsoid, smooth_texture, with_nose
 
 

@@ -18,6 +18,9 @@ from mien.numeric.raster import clip_columns, edge_line
 STRIP = 36
 """Rows of samples in a strip, whole pixels of 1, 2 or 3 rows; at full HD it fits into a cache."""
 
+# Side of the blocks of samples whose farthest one is kept; and strips end at whole pixels.
+BLOCK = 12
+
 # Columns of Coverage.planes.
 X, Y, W0, W1, W2, X1, Y1, X2, Y2 = range(9)
 
@@ -31,8 +34,9 @@ class Coverage(NamedTuple):
             the first row lies after the last where it holds none or cannot be drawn.
         planes: (F, 9) place of the first corner; 1 / z of the three; by how much the barycentrics
             of the second and the third grow in x and in y.
-        starts: (strips + 1,) where each strip's triangles start in order.
-        order: triangles strip by strip, in their own order within each.
+        starts: (2 strips + 1,) where each strip's fronts, and then its backs, start in order.
+        order: triangles by strip and side, in their own order within each.
+        left, width: the columns that the triangles reach, widened to whole blocks.
     """
 
     points: Float[Array, "v 2"]
@@ -41,6 +45,8 @@ class Coverage(NamedTuple):
     planes: Float[Array, "f 9"]
     starts: Int[Array, " s"]
     order: Int[Array, " n"]
+    left: int
+    width: int
 
 
 def prepare_coverage(
@@ -58,11 +64,14 @@ def prepare_coverage(
     """
     count = len(triangles)
     boxes, planes = np.empty((count, 4), np.int32), np.empty((count, 9))
-    starts = np.zeros(-(-height // STRIP) + 1, np.int64)
+    starts = np.zeros(2 * -(-height // STRIP) + 1, np.int64)
     _set_up(points, depth, triangles, width, height, boxes, planes, starts)
     order = np.empty(starts[-1], np.int32)
-    _sort(boxes, starts, order)
-    return Coverage(points, triangles, boxes, planes, starts, order)
+    _sort(boxes, planes, starts, order)
+    used = boxes[boxes[:, 0] <= boxes[:, 1]]
+    left = int(used[:, 2].min(initial=width)) // BLOCK * BLOCK
+    right = min(-(-int(used[:, 3].max(initial=-1) + 1) // BLOCK) * BLOCK, width)
+    return Coverage(points, triangles, boxes, planes, starts, order, left, max(right - left, 0))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -76,7 +85,7 @@ def _set_up(
     planes: Array,
     starts: Array,
 ) -> None:
-    """Fill boxes and planes; in starts[s + 1] leave how many triangles reach strips 0 to s."""
+    """Fill boxes, planes and starts."""
     for t in range(len(triangles)):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, bx, cx = points[i, 0], points[j, 0], points[k, 0]
@@ -97,23 +106,30 @@ def _set_up(
         boxes[t, 0], boxes[t, 1] = int(top), int(bottom)
         boxes[t, 2], boxes[t, 3] = int(left), int(right)
         for strip in range(int(top) // STRIP, int(bottom) // STRIP + 1):
-            starts[strip + 1] += 1
+            starts[2 * strip + 1 + (area > 0.0)] += 1
         planes[t, X], planes[t, Y] = ax, ay
         planes[t, W0], planes[t, W1], planes[t, W2] = 1.0 / za, 1.0 / zb, 1.0 / zc
         planes[t, X1], planes[t, Y1] = (cy - ay) / area, (ax - cx) / area
         planes[t, X2], planes[t, Y2] = (ay - by) / area, (bx - ax) / area
-    for strip in range(1, len(starts)):
-        starts[strip] += starts[strip - 1]
+    for group in range(1, len(starts)):
+        starts[group] += starts[group - 1]
 
 
 @njit(cache=True, nogil=True)
-def _sort(boxes: Array, starts: Array, order: Array) -> None:
+def _sort(boxes: Array, planes: Array, starts: Array, order: Array) -> None:
     place = starts.copy()
     for t in range(len(boxes)):
         if boxes[t, 0] <= boxes[t, 1]:
+            back = not _is_front(planes, t)
             for strip in range(boxes[t, 0] // STRIP, boxes[t, 1] // STRIP + 1):
-                order[place[strip]] = t
-                place[strip] += 1
+                order[place[2 * strip + back]] = t
+                place[2 * strip + back] += 1
+
+
+@njit(inline="always")
+def _is_front(planes: Array, t: int) -> bool:
+    """Counter-clockwise on the screen, as fronts go: the area is negative."""
+    return bool(planes[t, X1] * planes[t, Y2] < planes[t, X2] * planes[t, Y1])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -121,25 +137,59 @@ def cover_strip(coverage: Coverage, strip: int, ids: Array, nearest: Array) -> N
     """Write each sample's triangle, -1 for none.
 
     Args:
-        ids: (STRIP, W) int32. nearest: (STRIP, W) float32 to work with: 1 / z.
+        ids: (STRIP, coverage.width) int32, from column coverage.left on.
+        nearest: (STRIP, coverage.width) float32 to work with: 1 / z.
     """
     ids[:] = -1
     nearest[:] = 0.0
     origin = strip * STRIP
-    for n in range(coverage.starts[strip], coverage.starts[strip + 1]):
-        _cover(coverage, coverage.order[n], origin, ids, nearest)
+    farthest = np.empty((STRIP // BLOCK, -(-coverage.width // BLOCK)), np.float32)
+    backs = coverage.starts[2 * strip + 1]
+    for n in range(coverage.starts[2 * strip], coverage.starts[2 * strip + 2]):
+        t = coverage.order[n]
+        if n == backs:
+            _keep_farthest(nearest, farthest)
+        # Nearly all backs lie behind fronts: they are left out without looking at samples.
+        if n < backs or not _is_hidden(coverage, t, origin, farthest):
+            _cover(coverage, t, origin, ids, nearest)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
+def _keep_farthest(nearest: Array, farthest: Array) -> None:
+    farthest[:] = np.inf
+    for line in range(nearest.shape[0]):
+        for block in range(farthest.shape[1]):
+            lowest = farthest[line // BLOCK, block]
+            for col in range(block * BLOCK, min(block * BLOCK + BLOCK, nearest.shape[1])):
+                lowest = min(lowest, nearest[line, col])
+            farthest[line // BLOCK, block] = lowest
+
+
+@njit(inline="always")
+def _is_hidden(coverage: Coverage, t: int, origin: int, farthest: Array) -> bool:
+    """Whether everything in the blocks that triangle t reaches is nearer than its corners."""
+    box, planes = coverage.boxes, coverage.planes
+    top, bottom = max(box[t, 0] - origin, 0), min(box[t, 1] - origin, STRIP - 1)
+    left, right = box[t, 2] - coverage.left, box[t, 3] - coverage.left
+    own = max(planes[t, W0], planes[t, W1], planes[t, W2])
+    hidden = True
+    for line in range(top // BLOCK, bottom // BLOCK + 1):
+        for col in range(left // BLOCK, right // BLOCK + 1):
+            hidden = hidden and farthest[line, col] >= own
+    return hidden
+
+
+@njit(inline="always")
 def _cover(coverage: Coverage, t: int, origin: int, ids: Array, nearest: Array) -> None:
     points, triangles, planes = coverage.points, coverage.triangles, coverage.planes
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-    # Counter-clockwise on the screen, as fronts go: the area is negative.
-    if planes[t, X1] * planes[t, Y2] < planes[t, X2] * planes[t, Y1]:
+    if _is_front(planes, t):
         j, k = k, j
     a0, b0, x0, y0, closed0 = edge_line(points, j, k)
     a1, b1, x1, y1, closed1 = edge_line(points, k, i)
     a2, b2, x2, y2, closed2 = edge_line(points, i, j)
+    # Where an edge crosses a row's centres: the column moves by this much a row.
+    slope0, slope1, slope2 = b0 / a0, b1 / a1, b2 / a2
     w0 = planes[t, W0]
     rise1, rise2 = planes[t, W1] - w0, planes[t, W2] - w0
     across = rise1 * planes[t, X1] + rise2 * planes[t, X2]
@@ -149,20 +199,20 @@ def _cover(coverage: Coverage, t: int, origin: int, ids: Array, nearest: Array) 
     top, bottom = max(coverage.boxes[t, 0], origin), min(coverage.boxes[t, 1], origin + STRIP - 1)
     for row in range(top, bottom + 1):
         y = row + 0.5
-        left, right = clip_columns(a0, x0, b0 * (y - y0), closed0, first, last)
-        left, right = clip_columns(a1, x1, b1 * (y - y1), closed1, left, right)
-        left, right = clip_columns(a2, x2, b2 * (y - y2), closed2, left, right)
+        left, right = clip_columns(a0, x0, b0 * (y - y0), closed0, slope0 * (y - y0), first, last)
+        left, right = clip_columns(a1, x1, b1 * (y - y1), closed1, slope1 * (y - y1), left, right)
+        left, right = clip_columns(a2, x2, b2 * (y - y2), closed2, slope2 * (y - y2), left, right)
         # 1/z is linear on the screen.
         start = np.float32(w0 + across * (left + 0.5 - planes[t, X]) + down * (y - planes[t, Y]))
         line = row - origin
         for col in range(left, right + 1):
             w = start + step * np.float32(col - left)
-            if w > nearest[line, col]:
-                nearest[line, col] = w
-                ids[line, col] = t
+            if w > nearest[line, col - coverage.left]:
+                nearest[line, col - coverage.left] = w
+                ids[line, col - coverage.left] = t
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(inline="always")
 def barycentrics_at(planes: Array, t: int, x: float, y: float) -> tuple[float, float, float]:
     """Perspective-correct, never negative, summing to 1: a place past an edge comes to the edge."""
     dx, dy = x - planes[t, X], y - planes[t, Y]

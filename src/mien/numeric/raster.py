@@ -103,7 +103,7 @@ def check_triangles(triangles: object, vertices: int) -> Int[Array, "f 3"]:
     return indices
 
 
-@njit(cache=True, nogil=True)
+@njit(inline="always")
 def edge_line(vertices_px: Array, i: int, j: int) -> tuple[float, float, float, float, bool]:
     """The line i-j as a (x - x0) + b (y - y0), positive inside; whether a point on it is inside.
 
@@ -118,33 +118,38 @@ def edge_line(vertices_px: Array, i: int, j: int) -> tuple[float, float, float, 
     return a, b, x0, y0, a > 0.0 or (a == 0.0 and b > 0.0)
 
 
-@njit(cache=True, nogil=True)
+@njit(inline="always")
 def _inside(a: float, x0: float, rest: float, closed: bool, col: int) -> bool:
     e = a * (col + 0.5 - x0) + rest
     return e > 0.0 or (closed and e == 0.0)
 
 
-@njit(cache=True, nogil=True)
+@njit(inline="always")
 def clip_columns(
-    a: float, x0: float, rest: float, closed: bool, left: int, right: int
+    a: float, x0: float, rest: float, closed: bool, shift: float, left: int, right: int
 ) -> tuple[int, int]:
-    """Of the columns from left to right, the first and the last inside an edge."""
+    """Of the columns from left to right, the first and the last inside an edge.
+
+    Args:
+        shift: rest / a; the edge crosses the row at x0 - shift.
+    """
     if a == 0.0:
         return (left, right) if _inside(a, x0, rest, closed, left) else (left, left - 1)
-    # Rounding can put the crossing on the wrong side of a centre, so the ends are tested.
-    crossing = min(max(x0 - rest / a - 0.5, left - 1.0), right + 1.0)
+    crossing = min(max(x0 - shift - 0.5, left - 1.0), right + 1.0)
+    nearest = np.rint(crossing)
+    if abs(crossing - nearest) > 1e-6:
+        if a > 0.0:
+            return max(left, int(np.ceil(crossing))), right
+        return left, min(right, int(np.floor(crossing)))
+    # Rounding can put the crossing on the wrong side of a centre, so that centre is tested.
+    centre = int(nearest)
+    inside = _inside(a, x0, rest, closed, centre)
     if a > 0.0:
-        left = max(left, int(np.floor(crossing)))
-        while left <= right and not _inside(a, x0, rest, closed, left):
-            left += 1
-    else:
-        right = min(right, int(np.ceil(crossing)))
-        while left <= right and not _inside(a, x0, rest, closed, right):
-            right -= 1
-    return left, right
+        return max(left, centre if inside else centre + 1), right
+    return left, min(right, centre if inside else centre - 1)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fill_triangle(
     vertices_px: Array,
     depth: Array,
@@ -172,9 +177,9 @@ def _fill_triangle(
     for row in range(top, bottom + 1):
         y = row + 0.5
         r0, r1, r2 = b0 * (y - y0), b1 * (y - y1), b2 * (y - y2)
-        left, right = clip_columns(a0, x0, r0, closed0, box_left, box_right)
-        left, right = clip_columns(a1, x1, r1, closed1, left, right)
-        left, right = clip_columns(a2, x2, r2, closed2, left, right)
+        left, right = clip_columns(a0, x0, r0, closed0, r0 / a0, box_left, box_right)
+        left, right = clip_columns(a1, x1, r1, closed1, r1 / a1, left, right)
+        left, right = clip_columns(a2, x2, r2, closed2, r2 / a2, left, right)
         for col in range(left, right + 1):
             x = col + 0.5
             e0, e1, e2 = a0 * (x - x0) + r0, a1 * (x - x1) + r1, a2 * (x - x2) + r2
@@ -190,7 +195,7 @@ def _fill_triangle(
                 barycentrics[row, col, third] = p2 * inverse
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _rasterize_rows(
     vertices_px: Array,
     depth: Array,

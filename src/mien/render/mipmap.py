@@ -15,6 +15,9 @@ from mien.errors import InputError
 # for the colour and 13 for the weight.
 UNIT = 8192
 
+Four = tuple[np.uint64, ...]
+"""Places of four texels, then their weights in the same order."""
+
 
 class Pyramids(NamedTuple):
     """Several textures of one size, each with all its levels.
@@ -104,41 +107,27 @@ def _level_of_detail(texels: Array, points: Array, triangles: Array, detail: Arr
         detail[v] = 0.5 * np.log2(sums[v, 0] / sums[v, 1])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def place_lookup(
-    pyramids: Pyramids, u: float, v: float, level: float, places: Array, weights: Array
-) -> int:
-    """Which texels make the colour at (u, v), the same ones in every texture.
+@njit(inline="always")
+def place_lookup(pyramids: Pyramids, u: float, v: float, level: float) -> tuple[Four, Four]:
+    """Which texels make the colour at (u, v), and their weights: the same in every texture.
 
     Trilinear: bilinear in the two levels that come nearest to one texel a sample. u goes around,
     v points up and ends at the image's edge.
 
-    Args:
-        places: (8,) int64 to fill. weights: (8,) uint64 to fill: shares of UNIT.
-    Returns: how many there are, 4 or 8.
+    Returns: four in the finer and four in the coarser level.
     """
     last = len(pyramids.starts) - 1
     level = min(max(level, 0.0), float(last))
     fine = int(level)
     coarse_share = int((level - fine) * UNIT + 0.5)
-    _place_in_level(pyramids, fine, u, v, UNIT - coarse_share, places, weights, 0)
-    if coarse_share == 0:
-        return 4
-    _place_in_level(pyramids, fine + 1, u, v, coarse_share, places, weights, 4)
-    return 8
+    return (
+        _place_in_level(pyramids, fine, u, v, UNIT - coarse_share),
+        _place_in_level(pyramids, min(fine + 1, last), u, v, coarse_share),
+    )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _place_in_level(
-    pyramids: Pyramids,
-    level: int,
-    u: float,
-    v: float,
-    share: int,
-    places: Array,
-    weights: Array,
-    first: int,
-) -> None:
+@njit(inline="always")
+def _place_in_level(pyramids: Pyramids, level: int, u: float, v: float, share: int) -> Four:
     width, height = pyramids.widths[level], pyramids.heights[level]
     start = pyramids.starts[level]
     x = (u - np.floor(u)) * width - 0.5
@@ -147,32 +136,45 @@ def _place_in_level(
     left = x0 if x0 >= 0 else width - 1
     right = x0 + 1 if x0 + 1 < width else 0
     above, below = start + y0 * width, start + min(y0 + 1, height - 1) * width
-    places[first], places[first + 1] = above + left, above + right
-    places[first + 2], places[first + 3] = below + left, below + right
     # Rounded so that they sum to the share: a plain texture keeps its colour.
     lower = int(share * (y - y0) + 0.5)
     upper_right = int((share - lower) * (x - x0) + 0.5)
     lower_right = int(lower * (x - x0) + 0.5)
-    weights[first], weights[first + 1] = share - lower - upper_right, upper_right
-    weights[first + 2], weights[first + 3] = lower - lower_right, lower_right
+    return (
+        np.uint64(above + left),
+        np.uint64(above + right),
+        np.uint64(below + left),
+        np.uint64(below + right),
+        np.uint64(share - lower - upper_right),
+        np.uint64(upper_right),
+        np.uint64(lower - lower_right),
+        np.uint64(lower_right),
+    )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(inline="always")
 def weighted_texels(
-    texels: Array, texture: int, places: Array, weights: Array, count: int
+    texels: Array, texture: int, fine: Four, coarse: Four
 ) -> tuple[float, float, float]:
     """One texture's colour, from 0 to 255."""
-    total = np.uint64(0)
-    for n in range(count):
-        texel = np.uint64(texels[texture, places[n]])
-        spread = (
-            (texel & np.uint64(0xFF))
-            | ((texel & np.uint64(0xFF00)) << np.uint64(13))
-            | ((texel & np.uint64(0xFF0000)) << np.uint64(26))
-        )
-        total += weights[n] * spread
+    total = _spread(texels[texture, fine[0]]) * fine[4]
+    total += _spread(texels[texture, fine[1]]) * fine[5]
+    total += _spread(texels[texture, fine[2]]) * fine[6]
+    total += _spread(texels[texture, fine[3]]) * fine[7]
+    total += _spread(texels[texture, coarse[0]]) * coarse[4]
+    total += _spread(texels[texture, coarse[1]]) * coarse[5]
+    total += _spread(texels[texture, coarse[2]]) * coarse[6]
+    total += _spread(texels[texture, coarse[3]]) * coarse[7]
     lane = np.uint64(0x1FFFFF)
     red = np.int64(total & lane)
     green = np.int64((total >> np.uint64(21)) & lane)
     blue = np.int64(total >> np.uint64(42))
     return red / UNIT, green / UNIT, blue / UNIT
+
+
+@njit(inline="always")
+def _spread(texel: np.uint32) -> np.uint64:
+    """Every channel in the lowest 8 of 21 bits."""
+    wide = np.uint64(texel)
+    green, blue = wide & np.uint64(0xFF00), wide & np.uint64(0xFF0000)
+    return (wide & np.uint64(0xFF)) | (green << np.uint64(13)) | (blue << np.uint64(26))

@@ -80,12 +80,12 @@ def draw_mix(
     points, depth = project_safely(vertices, large), large.to_camera(vertices)[:, 2]
     coverage = prepare_coverage(points, depth, painted.triangles, large.width, large.height)
     surface = _surface(painted, points, weights, brightness, factor)
-    image = np.empty((camera.height, camera.width, 4), np.uint8)
+    image = np.zeros((camera.height, camera.width, 4), np.uint8)
 
     def strips(first: int, end: int) -> None:
         _draw_strips(coverage, surface, painted.pyramids, factor, first, end, image)
 
-    for_row_bands(strips, len(coverage.starts) - 1, work=large.width * large.height)
+    for_row_bands(strips, len(coverage.starts) // 2, work=large.width * large.height)
     return image
 
 
@@ -113,6 +113,22 @@ def _list_textures(triangles: Array, shades: Array, mixed: Array, mixes: Array) 
                 mixes[t] += 1
 
 
+class Fragments(NamedTuple):
+    """What the triangles show of a row of pixels: each triangle in each pixel once.
+
+    Attributes:
+        triangles, columns: the first is coverage.left's.
+        x, y: the middle of the samples that show the triangle.
+        shares: how many those are, of all in the pixel.
+    """
+
+    triangles: Int[Array, " n"]
+    columns: Int[Array, " n"]
+    x: Float[Array, " n"]
+    y: Float[Array, " n"]
+    shares: Float[Array, " n"]
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _draw_strips(
     coverage: Coverage,
@@ -123,94 +139,109 @@ def _draw_strips(
     end: int,
     image: Array,
 ) -> None:
-    width = image.shape[1]
-    ids = np.empty((STRIP, width * factor), np.int32)
-    nearest = np.empty((STRIP, width * factor), np.float32)
-    places, weights = np.empty(8, np.int64), np.empty(8, np.uint64)
+    ids = np.empty((STRIP, coverage.width), np.int32)
+    nearest = np.empty((STRIP, coverage.width), np.float32)
+    most, width = coverage.width * factor, coverage.width // factor
+    fragments = Fragments(
+        np.empty(most, np.int32),
+        np.empty(most, np.int32),
+        np.empty(most, np.float32),
+        np.empty(most, np.float32),
+        np.empty(most, np.float32),
+    )
+    colours = np.empty((width, 4), np.float32)
+    places = np.empty((most, 7))
     rows = STRIP // factor
     for strip in range(first, end):
         cover_strip(coverage, strip, ids, nearest)
-        for row in range(strip * rows, min((strip + 1) * rows, image.shape[0])):
-            for col in range(width):
-                _resolve(coverage, surface, pyramids, ids, factor, row, col, places, weights, image)
+        for row in range(strip * rows, min((strip + 1) * rows, len(image))):
+            count = _list_fragments(ids, row, coverage.left, factor, fragments)
+            colours[:] = 0.0
+            _find_places(coverage, surface, fragments, count, places)
+            _add_colours(coverage.triangles, surface, pyramids, fragments, count, places, colours)
+            _write_row(colours, image, row, coverage.left // factor)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _resolve(
-    coverage: Coverage,
-    surface: Surface,
-    pyramids: Pyramids,
-    ids: Array,
-    factor: int,
-    row: int,
-    col: int,
-    places: Array,
-    weights: Array,
-    image: Array,
+def _list_fragments(ids: Array, row: int, origin: int, factor: int, fragments: Fragments) -> int:
+    line, top, all_samples, found = row * factor % STRIP, row * factor + 0.5, factor * factor, 0
+    for col in range(ids.shape[1] // factor):
+        left = col * factor
+        seen = 0
+        for a in range(all_samples):
+            t = ids[line + a // factor, left + a % factor]
+            if t < 0:
+                continue
+            x, y, count, known = 0, 0, 0, False
+            for b in range(all_samples):
+                if ids[line + b // factor, left + b % factor] == t:
+                    known = known or b < a
+                    x, y, count = x + b % factor, y + b // factor, count + 1
+            if known:
+                continue
+            fragments.triangles[found], fragments.columns[found] = t, col
+            fragments.x[found] = origin + left + 0.5 + x / count
+            fragments.y[found] = top + y / count
+            fragments.shares[found] = count / all_samples
+            found, seen = found + 1, seen + count
+            if seen == all_samples:
+                break
+    return found
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _find_places(
+    coverage: Coverage, surface: Surface, fragments: Fragments, count: int, places: Array
 ) -> None:
-    """One pixel: each triangle in it gives its colour once, at the middle of its samples."""
-    line, left = (row * factor) % STRIP, col * factor
-    red, green, blue, covered = 0.0, 0.0, 0.0, 0
-    for a in range(factor * factor):
-        t = ids[line + a // factor, left + a % factor]
-        if t < 0:
-            continue
-        x, y, count, known = 0, 0, 0, False
-        for b in range(factor * factor):
-            if ids[line + b // factor, left + b % factor] == t:
-                known = known or b < a
-                x, y, count = x + b % factor, y + b // factor, count + 1
-        if known:
-            continue
-        r, g, bl = _colour(
-            coverage,
-            surface,
-            pyramids,
-            t,
-            left + 0.5 + x / count,
-            row * factor + 0.5 + y / count,
-            places,
-            weights,
-        )
-        red, green, blue = red + count * r, green + count * g, blue + count * bl
-        covered += count
-    share = 1.0 / max(covered, 1)
-    image[row, col, 0] = _byte(red * share)
-    image[row, col, 1] = _byte(green * share)
-    image[row, col, 2] = _byte(blue * share)
-    image[row, col, 3] = _byte(covered * 255.0 / (factor * factor))
+    """Barycentrics, texture coordinates, level of detail and brightness of every fragment."""
+    triangles, uvs, shades = coverage.triangles, surface.uvs, surface.shades
+    for f in range(count):
+        t = fragments.triangles[f]
+        b0, b1, b2 = barycentrics_at(coverage.planes, t, fragments.x[f], fragments.y[f])
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        places[f, 0], places[f, 1], places[f, 2] = b0, b1, b2
+        for c in range(2):
+            places[f, 3 + c] = b0 * uvs[t, 0, c] + b1 * uvs[t, 1, c] + b2 * uvs[t, 2, c]
+            places[f, 5 + c] = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _colour(
-    coverage: Coverage,
+def _add_colours(
+    triangles: Array,
     surface: Surface,
     pyramids: Pyramids,
-    t: int,
-    x: float,
-    y: float,
+    fragments: Fragments,
+    count: int,
     places: Array,
-    weights: Array,
-) -> tuple[float, float, float]:
-    """P02 eq. (5): the weighted sum of the textures, where triangle t shows the place (x, y)."""
-    b0, b1, b2 = barycentrics_at(coverage.planes, t, x, y)
-    triangles, uvs, shades = coverage.triangles, surface.uvs, surface.shades
-    i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-    u = b0 * uvs[t, 0, 0] + b1 * uvs[t, 1, 0] + b2 * uvs[t, 2, 0]
-    v = b0 * uvs[t, 0, 1] + b1 * uvs[t, 1, 1] + b2 * uvs[t, 2, 1]
-    level = b0 * shades[i, 0] + b1 * shades[j, 0] + b2 * shades[k, 0]
-    brightness = b0 * shades[i, 1] + b1 * shades[j, 1] + b2 * shades[k, 1]
-    count = place_lookup(pyramids, u, v, level, places, weights)
-    red, green, blue = 0.0, 0.0, 0.0
-    for n in range(surface.mixes[t]):
-        texture = surface.mixed[t, n]
-        c = 2 + texture
-        share = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]
-        r, g, b = weighted_texels(pyramids.texels, texture, places, weights, count)
-        red, green, blue = red + share * r, green + share * g, blue + share * b
-    return red * brightness, green * brightness, blue * brightness
+    colours: Array,
+) -> None:
+    """P02 eq. (5): to every pixel its fragments' weighted sums of the textures."""
+    for f in range(count):
+        t = fragments.triangles[f]
+        b0, b1, b2 = places[f, 0], places[f, 1], places[f, 2]
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        fine, coarse = place_lookup(pyramids, places[f, 3], places[f, 4], places[f, 5])
+        red, green, blue = 0.0, 0.0, 0.0
+        for n in range(surface.mixes[t]):
+            texture = surface.mixed[t, n]
+            c = 2 + texture
+            shades = surface.shades
+            share = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]
+            r, g, b = weighted_texels(pyramids.texels, texture, fine, coarse)
+            red, green, blue = red + share * r, green + share * g, blue + share * b
+        col, share = fragments.columns[f], fragments.shares[f]
+        lit = share * places[f, 6]
+        colours[col, 0] += lit * red
+        colours[col, 1] += lit * green
+        colours[col, 2] += lit * blue
+        colours[col, 3] += share
 
 
-@njit(cache=True, nogil=True)
-def _byte(value: float) -> int:
-    return int(min(max(np.rint(value), 0.0), 255.0))
+@njit(cache=True, nogil=True, error_model="numpy")
+def _write_row(colours: Array, image: Array, row: int, left: int) -> None:
+    for col in range(len(colours)):
+        alpha = colours[col, 3]
+        whole = 1.0 / max(alpha, np.float32(1e-3))
+        for c in range(3):
+            image[row, left + col, c] = min(max(np.rint(colours[col, c] * whole), 0.0), 255.0)
+        image[row, left + col, 3] = np.rint(alpha * 255.0)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from mien.arrays import Array, UInt8
 from mien.camera import Camera
 from mien.errors import InputError
