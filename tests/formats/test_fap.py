@@ -58,8 +58,8 @@ def test_one_mm_is_1024_over_the_unit() -> None:
 
 def test_parameters_that_go_one_way_are_never_negative() -> None:
     meter = FapMeter.of(NEUTRAL)
-    up_and_back = meter.read(NEUTRAL + [0.0, 1.0, -1.0])
-    down = meter.read(NEUTRAL - [0.0, 1.0, 0.0])
+    up_and_back = meter.read(NEUTRAL + np.array([0.0, 1.0, -1.0]))
+    down = meter.read(NEUTRAL - np.array([0.0, 1.0, 0.0]))
     for name in ("open_jaw", "thrust_jaw"):
         assert up_and_back[BY_NAME[name]] == 0
     for name in ("lift_l_cheek", "lift_r_cheek"):

@@ -1,7 +1,7 @@
 """The 68 facial animation parameters of MPEG-4, and where on the mesh each is measured.
 
-Source: ISO/IEC 14496-2 annex C, table C-1; the feature points' places on our mesh are our choice, listed in
-docs/animation.md.
+Source: ISO/IEC 14496-2 annex C, table C-1; the feature points' places on our mesh are our choice,
+listed in docs/animation.md.
 """
 
 from __future__ import annotations
