@@ -7,10 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from mien.app.demo import demo_photos
 from mien.arrays import Array
 from mien.assets.generic import load_generic_head
+from mien.capture.source import load_capture
 from mien.expressions.contacts import Mechanics, fit_units
 from mien.expressions.transfer import transfer_units
+from mien.model.dense.eyes import seat_eyes
+from mien.model.fit import FitOptions, fit_views
 from people import person
 
 
@@ -40,12 +44,17 @@ def both(name: str, weight: float = 1.0) -> dict[str, float]:
     return {f"{name}Left": weight, f"{name}Right": weight}
 
 
-@pytest.fixture(scope="session", params=["generic", "person 0", "person 1"])
+@pytest.fixture(scope="session", params=["generic", "person 0", "person 1", "James"])
 def rigged(request: pytest.FixtureRequest) -> Rigged:
-    """The generic head and two persons whose skin is a little rough, as fitted skin is."""
+    """The generic head, two persons whose skin is a little rough, as fitted skin is, and a man
+    fitted to the marks on his photos."""
     generic = load_generic_head()
     vertices = np.array(generic.mesh.vertices)
-    if request.param != "generic":
+    if request.param == "James":
+        views = load_capture(demo_photos()).expressions["neutral"]
+        fit = fit_views(views, generic, FitOptions(dense=False))
+        vertices = seat_eyes(np.array(fit.vertices), generic)
+    elif request.param != "generic":
         seed = int(request.param[-1])
         bumps = np.random.default_rng(seed).normal(size=(8, 2, 3))
         waves = np.sin(vertices @ (bumps[:, 0].T / 12)) @ bumps[:, 1] * 0.1
