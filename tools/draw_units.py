@@ -17,6 +17,7 @@ from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.camera import Camera
 from mien.expressions.contacts import Mechanics, fit_units
+from mien.expressions.gaze import SIDES
 from mien.formats.head_folder import load_head
 from mien.model.head import ATLAS, Head
 from mien.render.shade import render
@@ -43,24 +44,35 @@ def _tiles(head: Head, generic: GenericHead) -> Iterable[UInt8[Array, "h w 3"]]:
     neutral = np.array(head.mesh.vertices)
     units = fit_units(generic, neutral)
     mechanics = Mechanics.of(generic, neutral, units)
-    eyes, mouth = _middles(generic, neutral)
+    places = _places(generic, neutral)
     for name in generic.unit_names:
         weights = {name: 1.0, **_WITH.get(name, {})}
         added = [weight * units[generic.unit_names.index(key)] for key, weight in weights.items()]
         posed = mechanics.applied(neutral + sum(added), weights)
-        upper = name.startswith(("eye", "brow", "cheekSquint", "noseSneer"))
-        side = 35.0 if name.endswith("Left") else -35.0
-        front = _look_at((eyes + mouth) / 2, width_mm=190)
-        near = _look_at(eyes if upper else mouth, width_mm=135 if upper else 110, yaw=side)
+        front = _look_at((places["eyes"] + places["mouth"]) / 2, width_mm=190)
+        near = _near(name, places)
         faces = [_picture(head, posed, camera) for camera in (front, near)]
         yield _labelled(np.hstack(faces), " + ".join(weights))
 
 
-def _middles(generic: GenericHead, vertices: Float[Array, "v 3"]) -> tuple[Array, Array]:
-    """(3,) mm: between the eyes, and the mouth's middle."""
-    eyes = [generic.vertex_of(f"{side}_eye_inner") for side in ("left", "right")]
-    mouth = [generic.vertex_of(f"{side}_mouth_corner") for side in ("left", "right")]
-    return vertices[eyes].mean(axis=0), vertices[mouth].mean(axis=0) - [0, 12, 0]
+def _places(generic: GenericHead, vertices: Float[Array, "v 3"]) -> dict[str, Array]:
+    """(3,) mm: the eyes, the middle between them, and the mouth's."""
+    lids = {side: list(generic.polylines[f"{side}_upper_eyelid"]) for side in SIDES}
+    places = {side: vertices[line].mean(axis=0) - [0, 4, 0] for side, line in lids.items()}
+    corners = [generic.vertex_of(f"{side}_mouth_corner") for side in SIDES]
+    mouth = vertices[corners].mean(axis=0) - [0, 12, 0]
+    return places | {"eyes": (places["left"] + places["right"]) / 2, "mouth": mouth}
+
+
+def _near(unit: str, places: dict[str, Array]) -> Camera:
+    """A camera that looks at what the unit moves, from its side."""
+    side = "left" if unit.endswith("Left") else "right"
+    yaw = 35.0 if side == "left" else -35.0
+    if unit.startswith("eye"):
+        return _look_at(places[side], width_mm=55, yaw=yaw / 2)
+    if unit.startswith(("brow", "cheekSquint", "noseSneer")):
+        return _look_at(places["eyes"], width_mm=125, yaw=yaw)
+    return _look_at(places["mouth"], width_mm=100, yaw=yaw)
 
 
 def _look_at(target: Float[Array, " 3"], *, width_mm: float, yaw: float = 0.0) -> Camera:
