@@ -1,3 +1,5 @@
+"""Performances from files of either kind."""
+
 from __future__ import annotations
 
 from pathlib import Path
