@@ -22,7 +22,7 @@ _OPEN_LIPS = 4.0
 _RESTLESS = 0.2
 """How much less at rest a frame may be than the one most at rest."""
 _SHARP_SHARE = 0.5
-_SAME_POSE = np.radians(3)
+_SAME_POSE, _ONE_SIDE = np.radians(3), np.radians(10)
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,14 @@ def choose_frames(scores: FrameScores, count: int) -> Int[Array, " m"]:
 
     Among frames that are sharp and show the face at rest, begins with the most frontal one and goes
     on to whichever pose is farthest from all chosen so far, taking the
-    sharpest frame near that pose, until every pose left is within 3 degrees of a chosen one.
+    sharpest frame near that pose, until every pose left is within 3 degrees of a chosen one. Where
+    the head turns by less than 10 degrees, the frame most at rest is enough.
     """
     usable = _usable(scores)
     pose, sharpness = scores.pose[usable], scores.sharpness[usable]
+    if np.ptp(pose, axis=0).max() < _ONE_SIDE:
+        # More would tell no depth, and blur the texture.
+        return usable[[int(_unrest(scores)[usable].argmin())]]
     distance = np.linalg.norm(pose, axis=1)
     target = int(distance.argmin())
     distance = np.full(len(pose), np.inf)

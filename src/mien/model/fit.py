@@ -18,7 +18,6 @@ from mien.model.features import gather_features
 from mien.model.guide import guide_features
 from mien.model.landmark_fit import FitOptions, Solution, residuals_of, solve_by_features
 from mien.model.registration import register_solution
-from mien.model.resection import place_cameras
 from mien.model.verdict import (
     HOPELESS_SIGMAS,
     PhotoFit,
@@ -33,6 +32,7 @@ __all__ = ["Fit", "FitOptions", "fit_views"]
 
 ONE_SIDE_DEG = 10.0
 """Photos from within so much, as landmarks alone have it, tell no depth."""
+ONE_SIDE = "it looks from the same side as {}, and would only blur what that one shows"
 NEARER_TELLS = 1.3
 """Unless one is taken from so many times the distance of another: perspective tells it, too."""
 
@@ -129,12 +129,12 @@ def _all_photos(
     best = int(np.nansum(1 / solution.features.sigma_mm, axis=1).argmax())
     view = solution.views[best]
     alone = solve_by_features([view], gather_features([view], generic), generic, options)
-    focal = np.full(len(solution.views), alone.cameras[0].focal_px)
-    cameras = place_cameras(solution.views, solution.features, focal, alone.vertices)
-    cameras = tuple(alone.cameras[0] if k == best else item for k, item in enumerate(cameras))
-    return replace(
-        solution, cameras=cameras, vertices=alone.vertices, uncertainty_mm=alone.uncertainty_mm
-    )
+    problems = {
+        other.photo.name: ONE_SIDE.format(view.photo.name)
+        for other in solution.views
+        if other is not view
+    }
+    return replace(alone, problems=solution.problems | problems)
 
 
 def _from_one_side(cameras: Sequence[Camera]) -> bool:

@@ -12,11 +12,11 @@ from mien.arrays import Array, Float, frozen
 from mien.numeric.sample import bilinear_place
 from mien.numeric.threads import for_row_bands
 from mien.texture.surface import SurfaceMap
-from mien.texture.visibility import View, camera_numbers, project_point, sight
+from mien.texture.visibility import LEAST_CERTAINTY, View, camera_numbers, project_point, sight
 
 # Certainties (cosines) between which a view's colours fade out: a texel that is seen at 80
 # degrees or more is a smear, at 70 degrees it is as good as its surroundings.
-_FADE = (0.17, 0.34)
+FADE = (LEAST_CERTAINTY, 0.34)
 
 # The feather blends one photo into another and is wide. Towards what is only filled a photo's
 # colours reach further: they stand by themselves from a third of the ramp on.
@@ -45,7 +45,8 @@ def blend_views(
     gains: Float[Array, "k 3"] | None = None,
     *,
     feather_mm: float,
-    certainty_power: float,
+    certainty_power: float = 1.0,
+    fade: tuple[float, float] = FADE,
 ) -> Blend:
     """The convex combination of the photos on every texel (P02 sec. 5.2.1).
 
@@ -53,19 +54,20 @@ def blend_views(
         gains: (K, 3) factors on each photo's colours; 1 when None.
         feather_mm: as for visibility.sight.
         certainty_power: g_k = F_k P_k^power; 1 in the paper.
+        fade: cosines between which a photo's colours fade out.
     """
     shape = surface.triangle_ids.shape
     colours = np.zeros((*shape, 3), np.float32)
     coverage, confidence = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     for k, view in enumerate(views):
-        seen = sight(surface, view, feather_mm=feather_mm)
+        seen = sight(surface, view, feather_mm=feather_mm, least_certainty=fade[0])
         gain = np.ones(3) if gains is None else gains[k]
         arrays = (surface.points, seen.feathered, seen.certainty, view.photo)
         inputs = [frozen(np.ascontiguousarray(array)) for array in arrays]
         inputs += [camera_numbers(view.camera), frozen(np.asarray(gain, np.float32))]
 
         def rows(first: int, end: int, inputs: list[Array] = inputs) -> None:
-            _add_rows(*inputs, certainty_power, first, end, colours, coverage, confidence)
+            _add_rows(*inputs, certainty_power, *fade, first, end, colours, coverage, confidence)
 
         for_row_bands(rows, shape[0], work=coverage.size)
     colours /= np.maximum(coverage, 1e-12)[..., None]
@@ -81,6 +83,8 @@ def _add_rows(
     pose: Array,
     gain: Array,
     power: float,
+    low: float,
+    high: float,
     first: int,
     end: int,
     colours: Array,
@@ -89,7 +93,6 @@ def _add_rows(
 ) -> None:
     """Add one photo, weighted by g_k, to the sums."""
     height, width = photo.shape[:2]
-    low, high = _FADE
     for row in range(first, end):
         for col in range(coverage.shape[1]):
             if feathered[row, col] <= 0.0:

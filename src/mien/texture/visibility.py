@@ -21,7 +21,7 @@ from mien.texture.surface import SurfaceMap
 _JUMP_MM = 3.0
 _STEEPEST = 4.0
 # What the camera sees of a surface steeper than this (80 degrees) is no use.
-_LEAST_CERTAINTY = 0.17
+LEAST_CERTAINTY = 0.17
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,12 @@ def prepare_view(
 
 
 def sight(
-    surface: SurfaceMap, view: View, *, feather_mm: float = 12.0, tolerance_mm: float = 1.5
+    surface: SurfaceMap,
+    view: View,
+    *,
+    feather_mm: float = 12.0,
+    tolerance_mm: float = 1.5,
+    least_certainty: float = LEAST_CERTAINTY,
 ) -> Sight:
     """Feathered visibility F_k and positional certainty P_k of a surface in one view.
 
@@ -103,6 +108,7 @@ def sight(
         feather_mm: width of the ramp from invisible to fully visible, along the surface.
         tolerance_mm: how far behind the depth map a visible point can lie; more where the surface
             is steep, by what its depth changes within a pixel.
+        least_certainty: cosine below which a texel counts as turned away.
     Source: P02 sec. 5.2.1 and 5.2.2, steps 1 and 2. A texel is visible when it is inside the photo,
         faces the camera, lies on the depth map and falls on a usable pixel.
     """
@@ -115,7 +121,7 @@ def sight(
     pose = camera_numbers(view.camera)
 
     def rows(first: int, end: int) -> None:
-        _see_rows(*inputs, pose, tolerance_mm, first, end, visible, certainty)
+        _see_rows(*inputs, pose, tolerance_mm, least_certainty, first, end, visible, certainty)
 
     for_row_bands(rows, height, work=width * height)
     # Beyond a chart's edge nothing is known, so it does not count as a boundary.
@@ -257,6 +263,7 @@ def _see_rows(
     usable: Array,
     pose: Array,
     tolerance: float,
+    least: float,
     first: int,
     end: int,
     visible: Array,
@@ -273,7 +280,7 @@ def _see_rows(
             nx, ny, nz = normals[row, col]
             cosine = (nx * dx + ny * dy + nz * dz) / away
             certainty[row, col] = max(cosine, 0.0)
-            if cosine < _LEAST_CERTAINTY:
+            if cosine < least:
                 continue
             px, py, depth = project_point(pose, x, y, z)
             if not (depth > 0.0 and 0.0 <= px < width and 0.0 <= py < height):

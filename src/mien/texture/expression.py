@@ -1,0 +1,140 @@
+"""The texture of an expression: what its photos show over the texture of the neutral head."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Bool, Float, UInt8
+from mien.camera import Camera
+from mien.mesh import Mesh
+from mien.texture.atlas import fill_gutters
+from mien.texture.blend import Blend, blend_views
+from mien.texture.fill import fill_pyramid
+from mien.texture.parts import SEE_THROUGH, STYLES
+from mien.texture.subject import subject_mask
+from mien.texture.surface import SurfaceMap, over_vertices, parts_of
+from mien.texture.visibility import View, prepare_view
+
+FEATHER_MM = 3.0
+_FADE = (0.05, 0.2)
+"""Cosines between which colours fade out: steeper than where photos compete, for this one alone
+shows the expression."""
+_PARTS = tuple(name for name, style in STYLES.items() if style.photos == "best")
+_REACH_MM, _SKIN_REACH_MM = 6.0, 2.0
+"""How far what is seen goes on where nothing is seen."""
+_PARTS_FEATHER_MM = 0.7
+"""Eyes and teeth are seen through slits: little of them would be left of a wider ramp."""
+_ENOUGH = 2000
+"""Texels that both show for their exposures to be compared."""
+_MOST_GAIN = 1.6
+
+
+@dataclass(frozen=True)
+class ExpressionLook:
+    """What the photos of an expression show.
+
+    Attributes:
+        colours: (H, W, 3) float32, 0 to 255. share: (H, W) in [0, 1], how far they count.
+    """
+
+    colours: Float[Array, "h w 3"]
+    share: Float[Array, "h w"]
+
+    def over(self, below: UInt8[Array, "h w 3"], surface: SurfaceMap) -> UInt8[Array, "h w 3"]:
+        """The texture: these colours as far as they count, over what lies below."""
+        mixed = below + self.share[..., None] * (self.colours - below)
+        pixels = np.clip(np.rint(mixed), 0, 255).astype(np.uint8)
+        # Beyond the charts: where nothing is seen, the gutters below are as good.
+        return fill_gutters(pixels, surface.mask)
+
+
+def look_at_expression(
+    mesh: Mesh,
+    cameras: Sequence[Camera],
+    photos: Sequence[UInt8[Array, "h w 3"]],
+    *,
+    surface: SurfaceMap,
+    below: UInt8[Array, "h w 3"],
+    within: Float[Array, " v"],
+    cavity: Float[Array, " v"],
+) -> ExpressionLook:
+    """What photos show of an expression on the head's own texture map.
+
+    Args:
+        mesh: as fitted to the photos. surface: its atlas_surface, (H, W).
+        below: (H, W, 3) neutral's texture: exposures are matched to it.
+        within: (V,) in [0, 1], where skin may differ from neutral's: P02's facial mask (sec.
+            6.1.1); hair and neck are neutral's for all expressions.
+        cavity: (V,) in [0, 1], skin that shows through the open mouth alone.
+    """
+    solid = mesh.submesh(
+        mesh.triangles_of(*(name for name in mesh.part_names if name not in SEE_THROUGH))
+    )
+    views = [
+        prepare_view(
+            solid,
+            camera,
+            photo,
+            texel_mm=surface.texel_mm,
+            subject=subject_mask(solid, camera, photo),
+            # Lips and lids are fitted to this very photo, and no other shows what is between them.
+            edge_mm=0.0,
+            hidden_mm=0.0,
+        )
+        for camera, photo in zip(cameras, photos, strict=True)
+    ]
+    skin = parts_of(surface, mesh, "skin")
+    mask = over_vertices(surface, mesh, within[:, None])[..., 0]
+    gains = _gains(surface, views, below, skin & (mask > 0.5))
+    seen = blend_views(surface, views, gains, feather_mm=FEATHER_MM, fade=_FADE)
+    narrow = blend_views(surface, views, gains, feather_mm=_PARTS_FEATHER_MM, fade=_FADE)
+    inner = skin & (over_vertices(surface, mesh, cavity[:, None])[..., 0] > 0.5)
+    colours, share = np.zeros_like(seen.colours), np.zeros_like(seen.confidence)
+    everything = [(skin & ~inner, seen, _SKIN_REACH_MM), (inner, narrow, _REACH_MM)]
+    everything += [(parts_of(surface, mesh, name), narrow, _REACH_MM) for name in _PARTS]
+    for texels, blend, reach_mm in everything:
+        colours[texels], share[texels] = _spread(blend, texels, reach_mm / surface.texel_mm)
+    share[skin] *= mask[skin]
+    return ExpressionLook(colours, share.astype(np.float32))
+
+
+def _spread(
+    seen: Blend, texels: Bool[Array, "h w"], reach: float
+) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
+    """Colours of a part's texels, (N, 3), and how far they count, (N,): where they are seen, and
+    fading with the distance from there, for what is a little aside comes into view, too."""
+    import cv2
+
+    rows, columns = (np.flatnonzero(texels.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return np.zeros((0, 3), np.float32), np.zeros(0, np.float32)
+    box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    inside = texels[box]
+    sure = seen.confidence[box] * inside
+    if not (sure > 0.5).any():
+        return seen.colours[texels], seen.confidence[texels] * 0
+    filled = fill_pyramid(seen.colours[box], sure)
+    away = cv2.distanceTransform((sure <= 0.5).astype(np.uint8), cv2.DIST_L2, 5)
+    share = np.maximum(sure, np.clip(2 - 2 * away / reach, 0, 1))
+    return filled[inside], share[inside]
+
+
+def _gains(
+    surface: SurfaceMap,
+    views: Sequence[View],
+    below: UInt8[Array, "h w 3"],
+    texels: Bool[Array, "h w"],
+) -> Float[Array, "k 3"]:
+    """(K, 3) factors that bring each photo to neutral's exposure and white balance."""
+    gains = np.ones((len(views), 3))
+    for k, view in enumerate(views):
+        seen = blend_views(surface, [view], None, feather_mm=FEATHER_MM)
+        both = texels & (seen.confidence > 0.9)
+        if np.count_nonzero(both) < _ENOUGH:
+            continue
+        ratio = np.log(np.maximum(below[both], 8.0) / np.maximum(seen.colours[both], 8.0))
+        gains[k] = np.clip(np.exp(np.median(ratio, axis=0)), 1 / _MOST_GAIN, _MOST_GAIN)
+    return gains
