@@ -86,3 +86,10 @@ def test_upper_lids_follow_the_pupil(rigged: Rigged) -> None:
         for angle in (-15, -5, 0, 5)
     ]
     assert np.all(np.diff(heights) > 0.2)
+
+
+def test_far_down_the_eye_is_still_open(rigged: Rigged) -> None:
+    down = rigged.mechanics.applied(rigged.neutral, {}, Gaze(pitch=np.radians(-25)))
+    for lids in rigged.mechanics.contacts.lids:
+        opening = -lids.overlap(lids.places(down)) * lids.eyeball.radius
+        assert opening.max() > 1.0

@@ -14,6 +14,8 @@ from mien.expressions.state import Gaze
 from mien.numeric.rotation import rotation_from_vector
 
 SIDES = ("left", "right")
+_LAG = 0.35
+"""Of a gaze beyond what the units know, lids follow this share: they would close before it."""
 _WAYS = ("Down", "In", "Out", "Up")
 LOOK_UNITS = tuple(f"eyeLook{way}{side.capitalize()}" for way in _WAYS for side in SIDES)
 """The units that turn the eyeballs."""
@@ -169,11 +171,12 @@ class Look:
         return result
 
     def _lid_weights(self, gaze: Gaze) -> Float[Array, " 8"]:
-        """The weights at which the eyeLook units would turn the eyeballs as the gaze does."""
+        """How far the eyeLook units would turn the eyeballs as the gaze does, lagging beyond 1."""
         wanted = np.array([gaze.yaw, gaze.pitch])
         size = (self.angles**2).sum(axis=1)
-        shares: Array = np.maximum(self.angles @ wanted / size, 0.0)
-        return shares
+        shares = np.maximum(self.angles @ wanted / size, 0.0)
+        lagging: Array = np.minimum(shares, 1.0) + _LAG * np.maximum(shares - 1.0, 0.0)
+        return lagging
 
 
 def _side(unit: str) -> str:

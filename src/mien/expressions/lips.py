@@ -215,7 +215,7 @@ def _ways_out(
 def _around(lip: Lip, ways: Float[Array, "t 3"]) -> Int[Array, " n"]:
     """The tested vertices that go along with those that give way."""
     hit = ways.any(axis=1)
-    near: Array = np.flatnonzero(lip.spread[lip.tested][:, hit].any(axis=1))
+    near: Array = np.flatnonzero(lip.spread[np.ix_(lip.tested, hit)].any(axis=1))
     return near
 
 
