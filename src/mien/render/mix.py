@@ -117,8 +117,8 @@ class Fragments(NamedTuple):
     """What the triangles show of a row of pixels: each triangle in each pixel once.
 
     Attributes:
-        triangles, columns: the first is coverage.left's.
-        x, y: the middle of the samples that show the triangle.
+        triangles: of the coverage. columns: of pixels; the first holds the coverage's first.
+        x, y: in the strip, the middle of the samples that show the triangle.
         shares: how many those are, of all in the pixel.
     """
 
@@ -141,7 +141,7 @@ def _draw_strips(
 ) -> None:
     ids = np.empty((STRIP, coverage.width), np.int32)
     nearest = np.empty((STRIP, coverage.width), np.float32)
-    most, width = coverage.width * factor, coverage.width // factor
+    most, left = coverage.width * factor, coverage.left // factor
     fragments = Fragments(
         np.empty(most, np.int32),
         np.empty(most, np.int32),
@@ -149,60 +149,94 @@ def _draw_strips(
         np.empty(most, np.float32),
         np.empty(most, np.float32),
     )
-    colours = np.empty((width, 4), np.float32)
     places = np.empty((most, 7))
-    rows = STRIP // factor
+    colours = np.empty((coverage.width // factor, 4), np.float32)
     for strip in range(first, end):
         cover_strip(coverage, strip, ids, nearest)
-        for row in range(strip * rows, min((strip + 1) * rows, len(image))):
-            count = _list_fragments(ids, row, coverage.left, factor, fragments)
+        for line in range(0, STRIP, factor):
+            row = (strip * STRIP + line) // factor
+            if row == len(image):
+                break
+            count = _list_fragments(ids, line, factor, fragments)
+            _find_places(coverage, surface, fragments, strip, count, places)
             colours[:] = 0.0
-            _find_places(coverage, surface, fragments, count, places)
             _add_colours(coverage.triangles, surface, pyramids, fragments, count, places, colours)
-            _write_row(colours, image, row, coverage.left // factor)
+            _write_row(colours, image, row, left)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _list_fragments(ids: Array, row: int, origin: int, factor: int, fragments: Fragments) -> int:
-    line, top, all_samples, found = row * factor % STRIP, row * factor + 0.5, factor * factor, 0
+def _list_fragments(ids: Array, line: int, factor: int, fragments: Fragments) -> int:
+    """Fill in the fragments of the pixels whose samples begin in this line; return their number."""
+    middle, found = 0.5 * factor, 0
     for col in range(ids.shape[1] // factor):
-        left = col * factor
-        seen = 0
-        for a in range(all_samples):
-            t = ids[line + a // factor, left + a % factor]
-            if t < 0:
-                continue
-            x, y, count, known = 0, 0, 0, False
-            for b in range(all_samples):
-                if ids[line + b // factor, left + b % factor] == t:
-                    known = known or b < a
-                    x, y, count = x + b % factor, y + b // factor, count + 1
-            if known:
-                continue
+        t = ids[line, col * factor]
+        alike = True
+        for a in range(line, line + factor):
+            for b in range(col * factor, (col + 1) * factor):
+                alike &= ids[a, b] == t
+        if not alike:
+            found = _list_mixed(ids, line, col, factor, fragments, found)
+        elif t >= 0:
             fragments.triangles[found], fragments.columns[found] = t, col
-            fragments.x[found] = origin + left + 0.5 + x / count
-            fragments.y[found] = top + y / count
-            fragments.shares[found] = count / all_samples
-            found, seen = found + 1, seen + count
-            if seen == all_samples:
-                break
+            fragments.x[found], fragments.y[found] = col * factor + middle, line + middle
+            fragments.shares[found] = 1.0
+            found += 1
     return found
+
+
+@njit(inline="always")
+def _list_mixed(
+    ids: Array, line: int, col: int, factor: int, fragments: Fragments, first: int
+) -> int:
+    """The same for one pixel that shows several triangles, or one in a part of it."""
+    triangles, end = fragments.triangles, first
+    for a in range(line, line + factor):
+        for b in range(col * factor, (col + 1) * factor):
+            if ids[a, b] < 0:
+                continue
+            f = first
+            while f < end and triangles[f] != ids[a, b]:
+                f += 1
+            if f == end:
+                triangles[f], fragments.columns[f] = ids[a, b], col
+                fragments.x[f], fragments.y[f], fragments.shares[f] = 0.0, 0.0, 0.0
+                end += 1
+            fragments.x[f] += b + 0.5
+            fragments.y[f] += a + 0.5
+            fragments.shares[f] += 1.0
+    for f in range(first, end):
+        fragments.x[f] /= fragments.shares[f]
+        fragments.y[f] /= fragments.shares[f]
+        fragments.shares[f] /= factor * factor
+    return end
+
+
+# Columns of places.
+B0, B1, B2, U, V, LEVEL, BRIGHTNESS = range(7)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _find_places(
-    coverage: Coverage, surface: Surface, fragments: Fragments, count: int, places: Array
+    coverage: Coverage,
+    surface: Surface,
+    fragments: Fragments,
+    strip: int,
+    count: int,
+    places: Array,
 ) -> None:
-    """Barycentrics, texture coordinates, level of detail and brightness of every fragment."""
+    """Fill in where in their triangles, and where in the textures, the fragments are."""
     triangles, uvs, shades = coverage.triangles, surface.uvs, surface.shades
+    left, top = coverage.left, strip * STRIP
     for f in range(count):
         t = fragments.triangles[f]
-        b0, b1, b2 = barycentrics_at(coverage.planes, t, fragments.x[f], fragments.y[f])
+        x, y = left + fragments.x[f], top + fragments.y[f]
+        b0, b1, b2 = barycentrics_at(coverage.planes, t, x, y)
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        places[f, 0], places[f, 1], places[f, 2] = b0, b1, b2
-        for c in range(2):
-            places[f, 3 + c] = b0 * uvs[t, 0, c] + b1 * uvs[t, 1, c] + b2 * uvs[t, 2, c]
-            places[f, 5 + c] = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]
+        places[f, B0], places[f, B1], places[f, B2] = b0, b1, b2
+        places[f, U] = b0 * uvs[t, 0, 0] + b1 * uvs[t, 1, 0] + b2 * uvs[t, 2, 0]
+        places[f, V] = b0 * uvs[t, 0, 1] + b1 * uvs[t, 1, 1] + b2 * uvs[t, 2, 1]
+        places[f, LEVEL] = b0 * shades[i, 0] + b1 * shades[j, 0] + b2 * shades[k, 0]
+        places[f, BRIGHTNESS] = b0 * shades[i, 1] + b1 * shades[j, 1] + b2 * shades[k, 1]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -215,25 +249,23 @@ def _add_colours(
     places: Array,
     colours: Array,
 ) -> None:
-    """P02 eq. (5): to every pixel its fragments' weighted sums of the textures."""
+    """P02 eq. (5): add to every pixel its fragments' weighted sums of the textures."""
+    shades, mixed = surface.shades, surface.mixed
     for f in range(count):
         t = fragments.triangles[f]
-        b0, b1, b2 = places[f, 0], places[f, 1], places[f, 2]
+        b0, b1, b2 = places[f, B0], places[f, B1], places[f, B2]
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        fine, coarse = place_lookup(pyramids, places[f, 3], places[f, 4], places[f, 5])
+        fine, coarse = place_lookup(pyramids, places[f, U], places[f, V], places[f, LEVEL])
         red, green, blue = 0.0, 0.0, 0.0
         for n in range(surface.mixes[t]):
-            texture = surface.mixed[t, n]
-            c = 2 + texture
-            shades = surface.shades
-            share = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]
-            r, g, b = weighted_texels(pyramids.texels, texture, fine, coarse)
-            red, green, blue = red + share * r, green + share * g, blue + share * b
+            c = 2 + mixed[t, n]
+            weight = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]
+            r, g, b = weighted_texels(pyramids.texels, mixed[t, n], fine, coarse)
+            red, green, blue = red + weight * r, green + weight * g, blue + weight * b
         col, share = fragments.columns[f], fragments.shares[f]
-        lit = share * places[f, 6]
-        colours[col, 0] += lit * red
-        colours[col, 1] += lit * green
-        colours[col, 2] += lit * blue
+        colours[col, 0] += share * places[f, BRIGHTNESS] * red
+        colours[col, 1] += share * places[f, BRIGHTNESS] * green
+        colours[col, 2] += share * places[f, BRIGHTNESS] * blue
         colours[col, 3] += share
 
 
