@@ -1,23 +1,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from mien.capture.frame_choice import FrameScores, choose_frames, expression_distance
-from mien.capture.mediapipe_face import BLENDSHAPE_NAMES
-
-
-def clip(
-    yaw: list[float], sharpness: list[float] | None = None, smile: list[float] | None = None
-) -> FrameScores:
-    """Frames 0, 10, 20, ... with yaw in degrees."""
-    blendshapes = np.zeros((len(yaw), 52))
-    blendshapes[:, BLENDSHAPE_NAMES.index("mouthSmileLeft")] = smile or 0.0
-    return FrameScores(
-        10 * np.arange(len(yaw)),
-        np.array(sharpness or [1.0] * len(yaw)),
-        np.column_stack([np.radians(yaw), np.zeros(len(yaw))]),
-        blendshapes,
-    )
+from clips import clip, scored
+from mien.capture.frame_choice import choose_frames, expression_distance, sharp_rows
 
 
 def test_poses_spread_from_the_frontal_one() -> None:
@@ -33,30 +20,70 @@ def test_like_poses_are_taken_once() -> None:
 
 
 def test_the_sharpest_frame_of_a_pose() -> None:
-    scores = clip([0, 0.5, 1, 25, 25.5, 26], [0.8, 1.0, 0.7, 0.9, 0.8, 1.2])
+    scores = clip([0, 0.5, 1, 25, 25.5, 26], sharpness=[0.8, 1.0, 0.7, 0.9, 0.8, 1.2])
     assert choose_frames(scores, 7).tolist() == [1, 5]
 
 
 def test_blurred_frames_are_never_taken() -> None:
-    assert choose_frames(clip([0, 0, 0, 40], [1, 1, 1, 0.2]), 7).tolist() == [0]
+    assert choose_frames(clip([0, 0, 0, 40], sharpness=[1, 1, 1, 0.2]), 7).tolist() == [0]
+
+
+def test_sharp_is_what_is_not_half_as_sharp_as_the_others() -> None:
+    scores = clip([0] * 5, sharpness=[1.0, 0.49, 0.51, 1.2, 1.0])
+    assert sharp_rows(scores, np.arange(5)).tolist() == [0, 2, 3, 4]
+    assert sharp_rows(scores, np.array([1, 2])).tolist() == [1, 2], "beside each other only"
+    assert sharp_rows(scores, np.array([], int)).tolist() == []
 
 
 def test_another_expression_is_never_taken() -> None:
-    scores = clip([0, 10, 20, 40], smile=[0.1, 0.0, 0.1, 0.9])
+    smiles = [scored(mouthSmileLeft=score) for score in (0.1, 0.0, 0.1, 0.9)]
+    scores = clip([0, 10, 20, 40], scores=smiles)
     assert choose_frames(scores, 7).tolist() == [0, 1, 2]
-    np.testing.assert_allclose(expression_distance(scores.blendshapes)[3], [0.8], atol=0.11)
 
 
-def test_gaze_is_no_expression() -> None:
-    blendshapes = np.zeros((3, 52))
-    blendshapes[1, BLENDSHAPE_NAMES.index("eyeLookInLeft")] = 1.0
-    np.testing.assert_array_equal(expression_distance(blendshapes), 0)
+def test_an_open_mouth_is_not_at_rest_even_where_it_is_what_the_clip_shows_most() -> None:
+    talking = [0.12, 0.15, 0.1, 0.12, 0.0, 0.0]
+    scores = clip([0, 10, 20, -20, 5, 30], lips_apart=talking)
+    assert choose_frames(scores, 7).tolist() == [4, 5]
+
+
+def test_brows_at_rest_are_where_they_are_most_of_the_time() -> None:
+    usual, raised = scored(browInnerUp=0.5), scored(browInnerUp=0.0)
+    scores = clip([0, 10, 20, 30], scores=[raised, usual, usual, usual])
+    assert choose_frames(scores, 7).tolist() == [1, 2, 3]
+
+
+def test_a_head_that_hardly_turns_gives_the_frame_most_at_rest() -> None:
+    smiles = [scored(mouthSmile=score) for score in (0.1, 0.05, 0.0, 0.1)]
+    assert choose_frames(clip([0, 3, 9, 6], scores=smiles), 7).tolist() == [2]
+    assert len(choose_frames(clip([0, 3, 11, 6], scores=smiles), 7)) > 1
+
+
+def test_a_head_that_nods_turns() -> None:
+    scores = clip([0, 0, 0])
+    scores.pose[:, 1] = np.radians([-8, 0, 8])
+    assert choose_frames(scores, 7).tolist() == [0, 1, 2]
 
 
 def test_past_the_detectors_reach() -> None:
     assert choose_frames(clip([0, 70]), 7).tolist() == [0]
-    assert choose_frames(clip([65, 70]), 7).tolist() == [0, 1]
+    assert choose_frames(clip([55, 70]), 7).tolist() == [0, 1], "there is nothing else"
 
 
-def test_a_single_frame() -> None:
-    assert choose_frames(clip([12.0]), 7).tolist() == [0]
+@pytest.mark.parametrize("count", [1, 7])
+def test_a_single_frame(count: int) -> None:
+    assert choose_frames(clip([12.0]), count).tolist() == [0]
+
+
+def test_distance_from_one_expression() -> None:
+    blendshapes = np.stack([scored(), scored(mouthSmile=0.6), scored(mouthSmile=0.6, jawOpen=0.8)])
+    smile = 0.6 * np.sqrt(2)
+    np.testing.assert_allclose(
+        expression_distance(blendshapes, 0), [0, smile, np.hypot(smile, 0.8)]
+    )
+    np.testing.assert_allclose(expression_distance(blendshapes, 1), [smile, 0, 0.8])
+
+
+def test_gaze_is_no_expression() -> None:
+    blendshapes = np.stack([scored(), scored(eyeLookInLeft=1.0), scored(_neutral=1.0)])
+    np.testing.assert_array_equal(expression_distance(blendshapes, 0), 0)

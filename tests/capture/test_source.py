@@ -9,9 +9,12 @@ from PIL import Image
 
 import mien.assets
 from mien.arrays import Array
+from mien.capture import source
 from mien.capture.annotations import AnnotationNames
 from mien.capture.detector import NO_FACE
+from mien.capture.photos import Photo
 from mien.capture.source import TO_BE_PLACED, load_capture
+from mien.capture.video import PickedFrames
 from mien.errors import EstimationError, FileFormatError, InputError
 
 JAMES = Path(mien.assets.__file__).parent / "data" / "james"
@@ -204,9 +207,34 @@ def test_photos_that_ship_with_the_package() -> None:
 
 
 def test_video(shared: Path) -> None:
-    capture = load_capture(shared / "data/videos/single_face.mp4", frames=2)
+    path = shared / "data/videos/single_face.mp4"
+    capture = load_capture(path, frames=2, expressions=0)
     assert capture.name == "single_face"
+    assert list(capture.expressions) == ["neutral"]
     assert all(view.photo.stem.startswith("frame_") for view in capture.views)
+    assert all(view.photo.path == path for view in capture.views)
+
+
+def test_expressions_of_a_video_without_a_face_are_left_out(
+    tmp_path: Path, faces: dict[str, Array], wall: Array, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the quick look takes for a face may be none when looked at closely."""
+    asked: list[int | None] = []
+
+    def pick(path: Path, *, expressions: int | None, **options: object) -> PickedFrames:
+        asked.append(expressions)
+        shown = {"neutral": faces["left"], "smile": faces["right"], "frown": wall}
+        return PickedFrames(
+            {name: (Photo(f"{name}.png", path, pixels),) for name, pixels in shown.items()},
+            ("HDR video",),
+        )
+
+    monkeypatch.setattr(source, "pick_frames", pick)
+    (tmp_path / "a.mp4").write_bytes(b"")
+    capture = load_capture(tmp_path / "a.mp4", expressions=3)
+    assert asked == [3]
+    assert list(capture.expressions) == ["neutral", "smile"]
+    assert capture.notes == ("a.mp4: HDR video", f"frown.png: left out: {NO_FACE}")
 
 
 def test_seven_views_of_a_scan(shared: Path) -> None:

@@ -10,8 +10,10 @@ import cv2
 import numpy as np
 import pytest
 
+from clips import scored
 from mien.arrays import Array
 from mien.capture.detector import LandmarkDetector
+from mien.capture.mediapipe_face import LOWER_LIP, UPPER_LIP, DetectedFace
 from mien.capture.video import Video, pick_frames
 from mien.errors import EstimationError, FileFormatError, InputError
 
@@ -131,22 +133,59 @@ def test_sharp_frames_of_both_poses_are_picked(
     tmp_path: Path, small: dict[str, Array], detector: LandmarkDetector
 ) -> None:
     blurred = {side: cv2.GaussianBlur(pixels, (0, 0), 1.5) for side, pixels in small.items()}
-    frames = [*[blurred["left"]] * 3, small["left"], *[blurred["right"]] * 2, small["right"]]
-    path = written(tmp_path / "a.mp4", [*frames, small["left"]])
+    path = written(
+        tmp_path / "a.mp4",
+        [*[blurred["left"]] * 2, small["left"], *[blurred["right"]] * 2, small["right"]],
+    )
     seen: list[tuple[int, int]] = []
-    photos, notes = pick_frames(
+    picked = pick_frames(
         path, count=7, detector=detector, progress=lambda done, total: seen.append((done, total))
     )
-    names = [photo.name for photo in photos]
-    assert len(names) == 2
-    assert set(names) <= {"frame_000003.png", "frame_000006.png", "frame_000007.png"}
-    assert names[0] == "frame_000003.png" or names[1] == "frame_000007.png"
-    assert "frame_000006.png" in names
-    side = "left" if names[0] == "frame_000003.png" else "right"
-    assert np.abs(photos[0].pixels.astype(int) - small[side]).mean() < 3
-    assert notes[-1].startswith("2 of 8 judged frames chosen: the head turns by ")
+    assert list(picked.expressions) == ["neutral"]
+    photos = picked.expressions["neutral"]
+    assert [photo.name for photo in photos] == ["frame_000002.png", "frame_000005.png"]
+    assert np.abs(photos[0].pixels.astype(int) - small["left"]).mean() < 3
+    assert picked.notes == ("2 of 6 judged frames chosen: the head turns by 44 degrees in them",)
     assert seen == sorted(seen)
     assert all(done <= total for done, total in seen)
+
+
+PLAYED = {40: scored(), 80: scored(mouthSmile=0.9), 120: scored(jawOpen=0.7)}
+"""What an actor does in grey frames."""
+
+
+class Audience:
+    """A detector that sees the actor in them."""
+
+    def detect_fast(self, pixels: Array) -> DetectedFace | None:
+        level = 40 * round(pixels.mean() / 40)
+        if level not in PLAYED:
+            return None
+        points = np.random.default_rng(0).uniform(0, 48, size=(478, 3))
+        points[UPPER_LIP] = points[LOWER_LIP]
+        return DetectedFace(points, PLAYED[level], np.diag([1.0, -1.0, -1.0]))
+
+
+@pytest.mark.parametrize(
+    ("count", "names"),
+    [(None, ["neutral", "smile", "open_mouth"]), (1, ["neutral", "smile"]), (0, ["neutral"])],
+)
+def test_expressions_are_picked_and_named(
+    tmp_path: Path, count: int | None, names: list[str]
+) -> None:
+    path = written(tmp_path / "a.mp4", grey([40, 40, 200, 80, 40, 120]))
+    picked = pick_frames(path, expressions=count, detector=Audience())
+    assert list(picked.expressions) == names
+    levels = {"neutral": 40, "smile": 80, "open_mouth": 120}
+    for name, photos in picked.expressions.items():
+        (photo,) = photos
+        assert photo.pixels.mean() == pytest.approx(levels[name], abs=3)
+    if count is None:
+        assert picked.expressions["smile"][0].name == "frame_000003.png"
+        assert picked.notes == (
+            "1 of 5 judged frames chosen: the head turns by 0 degrees in them",
+            "2 other expressions chosen: smile, open_mouth",
+        )
 
 
 def test_no_face_in_any_frame(tmp_path: Path, detector: LandmarkDetector) -> None:
@@ -158,6 +197,7 @@ def test_no_face_in_any_frame(tmp_path: Path, detector: LandmarkDetector) -> Non
 
 
 def test_real_clip(shared: Path, detector: LandmarkDetector) -> None:
-    photos, _ = pick_frames(shared / "data/videos/single_face.mp4", count=3, detector=detector)
+    clip = shared / "data/videos/single_face.mp4"
+    photos = pick_frames(clip, count=3, detector=detector).expressions["neutral"]
     assert 1 <= len(photos) <= 3
     assert photos[0].size == (640, 360)

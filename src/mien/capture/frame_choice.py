@@ -84,6 +84,8 @@ def _usable(scores: FrameScores) -> Int[Array, " m"]:
 
 def sharp_rows(scores: FrameScores, rows: Int[Array, " n"]) -> Int[Array, " m"]:
     """Those of the rows that are not blurred beside the others."""
+    if not len(rows):
+        return rows
     sharpness = scores.sharpness[rows]
     sharp: Array = rows[sharpness >= _SHARP_SHARE * np.median(sharpness)]
     return sharp
