@@ -60,16 +60,23 @@ def test_what_a_unit_does_not_move_stays() -> None:
     assert not units[:, skin][still].any()
 
 
-def test_lower_teeth_keep_their_place_behind_the_lower_lip() -> None:
+@pytest.mark.parametrize("name", ["jawOpen", "jawForward"])
+def test_lower_teeth_move_with_the_jaw_and_stay_behind_the_lower_lip(name: str) -> None:
     head = person(4)
-    units = unit(transfer_units(GENERIC, head), "jawOpen")
-    teeth = part_vertices(GENERIC, "lower_teeth")
-    front = teeth[np.argmax(VERTICES[teeth, 2])]
-    lip = GENERIC.polylines["lower_lip_inner"][3]
-    change = units[front] - units[lip]
-    generic = unit(GENERIC.unit_offsets, "jawOpen")
-    np.testing.assert_allclose(change, generic[front] - generic[lip], atol=3.0)
-    assert not unit(transfer_units(GENERIC, head), "mouthSmileLeft")[teeth].any()
+    units = unit(transfer_units(GENERIC, head), name)
+    teeth, chin = part_vertices(GENERIC, "lower_teeth"), GENERIC.vertex_of("chin")
+    front = teeth[np.argsort(-VERTICES[teeth, 2])[:6]]
+    moved = np.linalg.norm(units[front], axis=1) / np.linalg.norm(units[chin])
+    generic = unit(GENERIC.unit_offsets, name)
+    expected = np.linalg.norm(generic[front], axis=1) / np.linalg.norm(generic[chin])
+    np.testing.assert_allclose(moved, expected, atol=0.15)
+    lip = GENERIC.polylines["lower_lip_outer"][4]
+    assert ((head + units)[front, 2] < (head + units)[lip, 2]).all()
+
+
+def test_teeth_and_tongue_stay_when_the_jaw_does() -> None:
+    parts = part_vertices(GENERIC, "lower_teeth", "upper_teeth", "tongue")
+    assert not unit(transfer_units(GENERIC, person(4)), "mouthSmileLeft")[parts].any()
 
 
 def test_the_stretch_of_an_affine_image_is_its_matrix() -> None:

@@ -24,6 +24,8 @@ _REACH_MM = 14.0
 """How far over the closed lid a correction of its edge fades out."""
 _BALL_MM = 18.0
 """Skin further off the eyeball has nothing to do with it."""
+_FIRM_MM = 0.5
+"""Lids that would overlap by this much more lie on each other."""
 _ALLOWED = 1e-6
 _ROUNDS = 4
 _STEPS = (0.25, 0.5, 0.75, 1.0)
@@ -170,12 +172,18 @@ def _closing(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
     places[:, 2] = np.maximum(places[:, 2], lids.least)
     down = lids.overlap(places) - lids.full_overlap
     places[:, 1] += lids.spread(places, down) * lids.on_upper
+    places[:, 2] += lids.spread(places, _off_lower(lids, places)) * lids.on_upper
+    moved: Array = lids.at(places) - lids.at(before)
+    return moved
+
+
+def _off_lower(lids: Lids, places: Float[Array, "l 3"]) -> Float[Array, " u"]:
+    """(U,) change of radius that lays the upper edge's vertices just before the lower edge."""
     upper, lower = lids.edges(places)
     wanted = np.interp(upper[:, 0], _rising(lower[:, 0]), lower[:, 2])
     wanted += lids.full_overlap * (_IN_FRONT_MM / _OVERLAP_MM)
-    places[:, 2] += lids.spread(places, wanted - upper[:, 2]) * lids.on_upper
-    moved: Array = lids.at(places) - lids.at(before)
-    return moved
+    off: Array = wanted - upper[:, 2]
+    return off
 
 
 def _lift(lids: Lids, places: Float[Array, "l 3"]) -> Float[Array, "l 3"]:
@@ -209,13 +217,19 @@ def resolve_lids(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3
     shift = vertices[lids.eyeball.vertices].mean(axis=0) - lids.eyeball.centre
     places = lids.places(vertices - shift) if shift.any() else lids.places(vertices)
     resolved = places.copy()
+    pressed = np.zeros(lids.upper)
     for _ in range(_ROUNDS):
         too_far = lids.overlap(resolved) - lids.full_overlap
         if (too_far < _ALLOWED).all():
             break
         # Either lid gives way by half.
+        pressed += np.maximum(too_far, 0.0)
         back = lids.spread(resolved, np.maximum(too_far, 0.0)) / 2
         resolved[:, 1] += np.where(lids.on_upper, back, -back)
+    if pressed.any():
+        firmly = np.minimum(pressed * lids.eyeball.radius / _FIRM_MM, 1.0)
+        along = _off_lower(lids, resolved) * firmly
+        resolved[:, 2] += lids.spread(resolved, along) * lids.on_upper
     inside = resolved[:, 2] < lids.least - _ALLOWED
     resolved[inside, 2] = lids.least[inside]
     if np.array_equal(resolved, places):

@@ -10,11 +10,12 @@ sparse least-squares problem a unit.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import coo_matrix, csr_matrix, diags
 
 from mien.arrays import Array, Bool, Float, Int, check_array
 from mien.assets.generic import GenericHead
 from mien.expressions.followers import Followers, part_vertices
+from mien.expressions.margins import full_path, skin_edges
 
 _REACH_MM = 12.0
 """Standard deviation of the neighbourhood over which the stretch of a head is judged."""
@@ -22,6 +23,13 @@ _RIDGE = 0.05
 """Share of the whole head's stretch in it: a flat neighbourhood tells nothing across itself."""
 _STILL_MM = 1e-4
 _LEAST_WEIGHT = 0.02
+_LINK = 1.0
+"""Weight of a link across mouth or eyes; an edge of an equilateral triangle weighs 0.58."""
+_OPENINGS = (
+    ("upper_lip_inner", "lower_lip_inner"),
+    ("left_upper_eyelid", "left_lower_eyelid"),
+    ("right_upper_eyelid", "right_lower_eyelid"),
+)
 _RIGID = ("left_eyeball", "right_eyeball", "upper_teeth", "lower_teeth", "tongue")
 _JAW_PARTS = ("lower_teeth", "tongue")
 _CHIN_MM = 30.0
@@ -114,7 +122,7 @@ def _integrated(
     """The skin's offsets whose differences along edges come nearest to the stretched ones."""
     from scipy.sparse.linalg import splu
 
-    laplacian = cotangent_laplacian(generic, skin)
+    laplacian = skin_laplacian(generic, skin)
     local = stretch[skin]
     bend = (laplacian @ local.reshape(-1, 9)).reshape(-1, 3, 3)
     result = np.zeros((len(units), len(skin), 3))
@@ -130,27 +138,53 @@ def _integrated(
     return result
 
 
-def cotangent_laplacian(generic: GenericHead, skin: Int[Array, " s"]) -> csr_matrix:
-    """(S, S) Laplacian of the generic skin; weights bounded below, so that it stays definite."""
-    mesh = generic.mesh
-    index = np.full(len(mesh.vertices), -1)
+def skin_laplacian(generic: GenericHead, skin: Int[Array, " s"]) -> csr_matrix:
+    """(S, S) cotangent Laplacian of the generic skin, with links across mouth and eyes.
+
+    Weights are bounded below, so that it stays definite.
+    """
+    index = np.full(len(generic.mesh.vertices), -1)
     index[skin] = np.arange(len(skin))
-    triangles = index[mesh.triangles[mesh.triangles_of("skin")]]
-    corners = mesh.vertices[skin][triangles]
-    rows, columns, values = [], [], []
+    pairs, weights = _edges(generic)
+    links = _links(generic)
+    a, b = index[np.concatenate([pairs, links])].T
+    weights = np.concatenate([weights, np.full(len(links), _LINK)])
+    place = (np.concatenate([a, b]), np.concatenate([b, a]))
+    values = np.concatenate([weights, weights])
+    adjacency = coo_matrix((values, place), (len(skin), len(skin))).tocsr()
+    degree = np.asarray(adjacency.sum(axis=1)).ravel()
+    return csr_matrix(diags(degree) - adjacency)
+
+
+def _edges(generic: GenericHead) -> tuple[Int[Array, "e 2"], Float[Array, " e"]]:
+    """The skin's edges, once for every triangle, and half the cotangents opposite to them."""
+    mesh = generic.mesh
+    triangles = mesh.triangles[mesh.triangles_of("skin")]
+    corners = mesh.vertices[triangles]
+    pairs, weights = [], []
     for corner in range(3):
         a, b = (corner + 1) % 3, (corner + 2) % 3
         to_a, to_b = corners[:, a] - corners[:, corner], corners[:, b] - corners[:, corner]
         area = np.linalg.norm(np.cross(to_a, to_b), axis=1)
-        cotangent = np.maximum((to_a * to_b).sum(axis=1) / area, _LEAST_WEIGHT) / 2
-        rows += [triangles[:, a], triangles[:, b]]
-        columns += [triangles[:, b], triangles[:, a]]
-        values += [cotangent, cotangent]
-    place = (np.concatenate(rows), np.concatenate(columns))
-    adjacency = coo_matrix((np.concatenate(values), place), (len(skin), len(skin))).tocsr()
-    degree = np.asarray(adjacency.sum(axis=1)).ravel()
-    laplacian = coo_matrix((degree, (np.arange(len(skin)),) * 2)).tocsr() - adjacency
-    return csr_matrix(laplacian)
+        cotangent = (to_a * to_b).sum(axis=1) / area
+        pairs.append(triangles[:, [a, b]])
+        weights.append(np.maximum(cotangent, _LEAST_WEIGHT) / 2)
+    return np.concatenate(pairs), np.concatenate(weights)
+
+
+def _links(generic: GenericHead) -> Int[Array, "l 2"]:
+    """Pairs of vertices across mouth and eyes: how far these open and close carries over, too."""
+    from scipy.spatial import cKDTree
+
+    places = generic.mesh.vertices
+    edges = skin_edges(generic, places)
+    pairs = []
+    for opening in _OPENINGS:
+        upper, lower = (full_path(edges, generic.polylines[name])[1:-1] for name in opening)
+        for line, other in ((upper, lower), (lower, upper)):
+            nearest = other[cKDTree(places[other]).query(places[line])[1]]
+            pairs.append(np.column_stack([line, nearest]))
+    return np.concatenate(pairs)
 
 
 def _follow_jaw(
