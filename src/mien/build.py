@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+import numpy as np
 
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.capture.annotations import save_annotations
 from mien.capture.source import Capture, load_capture
 from mien.errors import EstimationError
+from mien.expressions.contacts import Contacts, fit_units
+from mien.expressions.gaze import with_turned_eyes
+from mien.expressions.looks import Photographed, paint_expressions
+from mien.expressions.regions import default_masks
 from mien.formats.atomic import atomic_folder
 from mien.formats.head_folder import check_head_place, is_head_folder, write_head
 from mien.formats.video import write_video
+from mien.model.expression.fit import ExpressionFit, fit_expression
+from mien.model.expression.known import KnownHead
 from mien.model.fit import Fit, FitOptions, fit_views
 from mien.model.head import ATLAS, CYLINDER, NEUTRAL, Expression, FittedView, Head
 from mien.render.picture import turntable_frames
@@ -29,6 +37,8 @@ Progress = Callable[[str, int, int], None]
 
 SOLVING = "Solving cameras and shape"
 TURNTABLE = "turntable.mp4"
+_NEGLIGIBLE = 0.01
+"""A unit with less weight has no part in an expression."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +50,9 @@ class BuildOptions:
         fill: "pyramid" or "grow": how texture that no photo shows is filled.
         texture_size: side of the atlas in px; the cylinder is always 2048x1024.
         face: which face where a photo shows several.
-        frames: how many frames to pick from a video.
+        frames: how many frames of the face at rest to pick from a video.
+        expressions: how many other expressions to pick from a video; None takes what differs, 0
+            neutral alone.
     """
 
     fit: FitOptions = field(default_factory=FitOptions)
@@ -48,6 +60,7 @@ class BuildOptions:
     texture_size: int = 2048
     face: int | None = None
     frames: int = 7
+    expressions: int | None = None
 
 
 @dataclass(frozen=True)
@@ -61,7 +74,7 @@ class Build:
 
     head: Head
     capture: Capture
-    fits: dict[str, Fit]
+    fits: dict[str, Fit | ExpressionFit]
     coverage: Float[Array, "h w"]
 
     @property
@@ -94,24 +107,51 @@ def build_head(
         source,
         face=options.face,
         frames=options.frames,
+        expressions=options.expressions,
         progress=lambda done, total: tell("Finding faces", done, total),
     )
     capture = _named_by_expression(capture)
     if NEUTRAL not in capture.expressions:
         raise EstimationError(f"{source}: there is no folder called {NEUTRAL} among its folders")
-    fits: dict[str, Fit] = {}
-    count = len(capture.expressions)
-    for number, (name, views) in enumerate(capture.expressions.items()):
-        tell(SOLVING, number, count)
-
-        def solving(done: int, total: int, number: int = number) -> None:
-            tell(SOLVING, number * total + done, count * total)
-
-        fits[name] = fit_views(views, generic, options.fit, progress=solving)
-    tell(SOLVING, count, count)
+    capture, fits = _fit_all(capture, generic, options, tell)
     head = _head(capture, fits, generic)
-    textures, coverage = _extract_textures(head, capture, options, tell)
-    return Build(replace(head, textures=textures), capture, fits, coverage)
+    head, coverage = _with_textures(head, capture, options, tell)
+    return Build(head, capture, fits, coverage)
+
+
+def _fit_all(
+    capture: Capture, generic: GenericHead, options: BuildOptions, tell: Progress
+) -> tuple[Capture, dict[str, Fit | ExpressionFit]]:
+    """Neutral by itself, then each expression with neutral as what is known.
+
+    An expression that cannot be fitted is left out of the capture, with a note.
+    """
+    count = len(capture.expressions)
+
+    def part(number: int) -> Callable[[int, int], None]:
+        return lambda done, total: tell(SOLVING, number * total + done, count * total)
+
+    tell(SOLVING, 0, count)
+    neutral = fit_views(capture.expressions[NEUTRAL], generic, options.fit, progress=part(0))
+    fits: dict[str, Fit | ExpressionFit] = {NEUTRAL: neutral}
+    views = [view for view in capture.expressions[NEUTRAL] if view.photo.name in neutral.photos]
+    cameras = [neutral.photos[view.photo.name].camera for view in views]
+    units = fit_units(generic, neutral.vertices)
+    known = KnownHead(views, cameras, neutral.vertices, units.astype(np.float64), generic)
+    contacts = Contacts.of(generic, neutral.vertices)
+    notes = []
+    for number, (name, shown) in enumerate(capture.expressions.items()):
+        if name == NEUTRAL:
+            continue
+        try:
+            fit = fit_expression(shown, known, progress=part(number))
+        except EstimationError as error:
+            notes.append(f"{name}: left out: {error}")
+            continue
+        fits[name] = replace(fit, vertices=contacts.resolved(fit.vertices))
+    tell(SOLVING, count, count)
+    fitted = {name: capture.expressions[name] for name in fits}
+    return replace(capture, expressions=fitted, notes=(*capture.notes, *notes)), fits
 
 
 def _named_by_expression(capture: Capture) -> Capture:
@@ -128,20 +168,22 @@ def _named_by_expression(capture: Capture) -> Capture:
     return replace(capture, expressions=expressions)
 
 
-def _head(capture: Capture, fits: dict[str, Fit], generic: GenericHead) -> Head:
+def _head(capture: Capture, fits: Mapping[str, Fit | ExpressionFit], generic: GenericHead) -> Head:
     neutral = fits[NEUTRAL]
+    assert isinstance(neutral, Fit)
     return Head(
         subject=capture.name,
         mesh=generic.mesh.with_vertices(neutral.vertices),
-        expressions={name: _expression(name, fit) for name, fit in fits.items()},
+        expressions={name: _expression(name, fit, generic) for name, fit in fits.items()},
         uncertainty_mm=neutral.uncertainty_mm,
         unit_names=generic.unit_names,
-        unit_offsets=generic.unit_offsets,
+        unit_offsets=fit_units(generic, neutral.vertices),
+        regions=default_masks(generic),
         left_out={photo: why for fit in fits.values() for photo, why in fit.left_out.items()},
     )
 
 
-def _expression(name: str, fit: Fit) -> Expression:
+def _expression(name: str, fit: Fit | ExpressionFit, generic: GenericHead) -> Expression:
     views = tuple(
         FittedView(
             photo=photo,
@@ -152,26 +194,41 @@ def _expression(name: str, fit: Fit) -> Expression:
         )
         for photo, item in fit.photos.items()
     )
-    return Expression(fit.vertices, views, ATLAS if name == NEUTRAL else name)
+    if isinstance(fit, Fit):
+        return Expression(fit.vertices, views, ATLAS)
+    weights = zip(generic.unit_names, fit.units.tolist(), strict=True)
+    units = {unit: weight for unit, weight in weights if weight > _NEGLIGIBLE}
+    vertices = with_turned_eyes(fit.vertices, fit.gaze, generic)
+    return Expression(vertices, views, name, units, fit.gaze)
 
 
-def _extract_textures(
+def _with_textures(
     head: Head, capture: Capture, options: BuildOptions, tell: Progress
-) -> tuple[dict[str, UInt8[Array, "h w 3"]], Float[Array, "h w"]]:
-    """An atlas for every expression, neutral's cylinder (P02 sec. 5.2.2), neutral's coverage."""
-    stage, total = "Extracting textures", len(head.expressions) + 1
+) -> tuple[Head, Float[Array, "h w"]]:
+    """The head with an atlas for every expression and neutral's cylinder (P02 sec. 5.2.2), and
+    neutral's coverage."""
+    stage, total, side = "Extracting textures", 3, options.texture_size
     tell(stage, 0, total)
-    textures: dict[str, Texture] = {}
-    side = options.texture_size
-    for name, expression in head.expressions.items():
-        atlas = atlas_surface(head.expression_mesh(name), width=side, height=side)
-        textures[expression.texture] = _extract(head, capture, name, atlas, options.fill)
-        tell(stage, len(textures), total)
+    atlas = atlas_surface(head.mesh, width=side, height=side)
+    base = _extract(head, capture, NEUTRAL, atlas, options.fill)
+    tell(stage, 1, total)
+    photos = _photos(capture)
+    photographed = {
+        name: Photographed(
+            item.vertices,
+            [view.camera for view in item.views],
+            [photos[view.photo] for view in item.views],
+        )
+        for name, item in head.expressions.items()
+    }
+    looks = paint_expressions(head.mesh, photographed, base.pixels, load_generic_head())
+    tell(stage, 2, total)
     around = cylinder_surface(head.mesh, fit_cylinder(head.mesh), parts=("skin",))
-    textures[CYLINDER] = _extract(head, capture, NEUTRAL, around, options.fill)
-    tell(stage, total, total)
-    pixels = {name: texture.pixels for name, texture in textures.items()}
-    return pixels, textures[ATLAS].coverage
+    cylinder = _extract(head, capture, NEUTRAL, around, options.fill)
+    tell(stage, 3, total)
+    textures = {head.expressions[name].texture: pixels for name, pixels in looks.textures.items()}
+    textures[CYLINDER] = cylinder.pixels
+    return replace(head, textures=textures, shading=looks.shading), base.coverage
 
 
 def _extract(head: Head, capture: Capture, name: str, surface: SurfaceMap, fill: Fill) -> Texture:

@@ -115,6 +115,17 @@ def turn_eyeballs(
     return result
 
 
+def with_turned_eyes(
+    vertices: Float[Array, "v 3"], gaze: Float[Array, "2 2"], generic: GenericHead
+) -> Float[Array, "v 3"]:
+    """The head with its eyeballs turned: (2, 2) rad, yaw and pitch of the left and the right."""
+    result = vertices.copy()
+    for side, (yaw, pitch) in zip(SIDES, gaze.tolist(), strict=True):
+        eyeball = Eyeball.of(generic, vertices, side)
+        result[eyeball.vertices] = eyeball.turned(vertices[eyeball.vertices], yaw, pitch)
+    return result
+
+
 @dataclass(frozen=True)
 class Look:
     """How the eyes of one head look around.

@@ -25,9 +25,12 @@ from mien.formats.head_json import (
     get_texts,
     head_to_json,
     is_inside,
+    motion_from_json,
+    shading_from_json,
     views_from_json,
 )
 from mien.formats.image import encode_image, load_image
+from mien.formats.region_masks import read_masks, write_masks
 from mien.mesh import Mesh
 from mien.model.head import NEUTRAL, Expression, Head
 
@@ -65,6 +68,7 @@ def write_head(
     (folder / "textures").mkdir()
     for name, texture in head.textures.items():
         (folder / "textures" / f"{name}.png").write_bytes(encode_image(texture, "PNG"))
+    write_masks(folder, head.mesh, head.regions)
     for name, annotation in (annotations or {}).items():
         file = folder / "annotations" / f"{name}.json"
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -114,6 +118,7 @@ def _head_from(folder: Path, data: Json) -> Head:
             vertices=arrays[f"vertices/{name}"],
             views=views_from_json(expressions, name),
             texture=get(expressions[name], "texture", str, f"expressions.{name}"),
+            **motion_from_json(expressions[name], f"expressions.{name}"),
         )
         for name in expressions
     }
@@ -136,6 +141,8 @@ def _head_from(folder: Path, data: Json) -> Head:
         unit_names=get_names(data, "face_units"),
         unit_offsets=arrays["unit_offsets"],
         textures={name: load_image(folder / get_path(files, name, "textures")) for name in files},
+        regions=read_masks(folder, mesh),
+        shading=shading_from_json(data),
         left_out=get_texts(data, "left_out"),
         generator=get(data, "generator", str),
     )

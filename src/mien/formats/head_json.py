@@ -6,12 +6,16 @@ from collections.abc import Mapping
 from pathlib import PurePosixPath
 from typing import Any, TypeVar
 
+import numpy as np
+
 from mien.arrays import Array, check_array
 from mien.camera import Camera
-from mien.model.head import FittedView, Head
+from mien.model.head import SHADING, FittedView, Head
 
 FORMAT = "mien head"
 VERSION = 1
+
+_EYES = ("left", "right")
 
 Json = dict[str, Any]
 Kind = TypeVar("Kind")
@@ -45,12 +49,18 @@ def head_to_json(head: Head, photo_files: Mapping[str, str]) -> Json:
         "expressions": {
             name: {
                 "texture": expression.texture,
+                "units": {unit: float(weight) for unit, weight in expression.units.items()},
+                "gaze_rad": {
+                    eye: {"yaw": float(yaw), "pitch": float(pitch)}
+                    for eye, (yaw, pitch) in zip(_EYES, expression.gaze, strict=True)
+                },
                 "cameras": [_view_to_json(view) for view in expression.views],
             }
             for name, expression in head.expressions.items()
         },
         "textures": {name: f"textures/{name}.png" for name in head.textures},
         "photos": dict(photo_files),
+        "shading": {part: list(terms) for part, terms in head.shading.items()},
         "left_out": dict(head.left_out),
         "face_units": list(head.unit_names),
     }
@@ -116,6 +126,31 @@ def views_from_json(data: Json, expression: str) -> tuple[FittedView, ...]:
     place = f"expressions.{expression}.cameras"
     items = get(get(data, expression, dict, "expressions"), "cameras", list, place[:-8])
     return tuple(_view_from_json(item, f"{place}[{i}]") for i, item in enumerate(items))
+
+
+def motion_from_json(data: Json, place: str) -> Json:
+    """Units and gaze of an expression, as fields of model.head.Expression; a head of an older mien
+    has none. Raises: Broken."""
+    units = get(data, "units", dict, place) if "units" in data else {}
+    weights = {name: get(units, name, float, f"{place}.units") for name in units}
+    if "gaze_rad" not in data:
+        return {"units": weights}
+    gaze = get(data, "gaze_rad", dict, place)
+    eyes = [get(gaze, eye, dict, f"{place}.gaze_rad") for eye in _EYES]
+    angles = [
+        [get(item, axis, float, f"{place}.gaze_rad.{eye}") for axis in ("yaw", "pitch")]
+        for eye, item in zip(_EYES, eyes, strict=True)
+    ]
+    return {"units": weights, "gaze": np.array(angles)}
+
+
+def shading_from_json(data: Json) -> dict[str, tuple[float, float, float]]:
+    """Coefficients by part; a head of an older mien has the usual ones. Raises: Broken."""
+    if "shading" not in data:
+        return dict(SHADING)
+    shading = get(data, "shading", dict)
+    terms = {part: _get_array(shading, part, (3,), "shading").tolist() for part in shading}
+    return {part: (c0, c1, c2) for part, (c0, c1, c2) in terms.items()}
 
 
 def _view_to_json(view: FittedView) -> Json:

@@ -15,6 +15,9 @@ from mien.mesh import Mesh
 NEUTRAL = "neutral"
 ATLAS = "atlas"
 CYLINDER = "cylinder"
+SHADING = {"eyes": (0.62, 0.52, -0.14), "teeth": (0.35, 3.2, -3.9)}
+"""Brightness of eyes and teeth as photographs usually have it: c0 + c1 o + c2 o^2, o being the gap
+between the lids over neutral's, or that between the lips over the mouth's width."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +54,24 @@ class Expression:
         vertices: (V, 3) mm, head space.
         views: the photos it was fitted to.
         texture: which of the head's textures belongs to it, in the mesh's own coordinates.
+        units: weights of the face units that explain it, as far as they do.
+        gaze: (2, 2) radians, yaw to the subject's left and pitch up of the left and the right eye,
+            from where they look in neutral. The vertices have it in them.
     """
 
     vertices: Float[Array, "v 3"]
     views: tuple[FittedView, ...] = ()
     texture: str = ATLAS
+    units: dict[str, float] = field(default_factory=dict)
+    gaze: Float[Array, "2 2"] = field(default_factory=lambda: np.zeros((2, 2)))
 
     def __post_init__(self) -> None:
         vertices = check_array("vertices", self.vertices, (None, 3))
         object.__setattr__(self, "vertices", frozen(vertices))
+        object.__setattr__(self, "gaze", frozen(check_array("gaze", self.gaze, (2, 2))))
+        for name, weight in self.units.items():
+            if not np.isfinite(weight):
+                raise InputError(f"units.{name}", "a finite number", weight)
 
 
 @dataclass(frozen=True)
@@ -75,6 +87,10 @@ class Head:
         unit_offsets: (K, V, 3) mm, added to the neutral vertices at weight 1.
         textures: (h, w, 3) sRGB by name. "atlas" lies in the mesh's own texture coordinates;
             "cylinder" is P02's map (sec. 5.2.1).
+        regions: (V,) in [0, 1], soft masks of the regions of the face that can be controlled
+            by themselves, by name; empty takes the generic head's (expressions.regions).
+        shading: coefficients of the brightness of "eyes" and "teeth" by how far lids and lips are
+            open (P02 sec. 5.2.4).
         left_out: why, by photo name, for every photo that did not fit.
         generator: the program that made it.
     Raises: InputError: shapes that do not fit, no neutral, a name that makes no file name.
@@ -87,12 +103,22 @@ class Head:
     unit_names: tuple[str, ...] = ()
     unit_offsets: Float[Array, "k v 3"] | None = None
     textures: dict[str, UInt8[Array, "h w 3"]] = field(default_factory=dict)
+    regions: dict[str, Float[Array, " v"]] = field(default_factory=dict)
+    shading: dict[str, tuple[float, float, float]] = field(default_factory=lambda: dict(SHADING))
     left_out: dict[str, str] = field(default_factory=dict)
     generator: str = field(default_factory=lambda: f"mien {version('mien')}")
 
     def __post_init__(self) -> None:
         shape = self.mesh.vertices.shape
         _check_expressions(self.expressions, self.mesh)
+        for name, weights in self.shading.items():
+            check_array(f"shading.{name}", weights, (3,))
+        if set(self.shading) != set(SHADING):
+            raise InputError("shading", " and ".join(SHADING), ", ".join(self.shading) or "nothing")
+        regions = {
+            name: frozen(check_array(f"region {name}", mask, shape[:1]))
+            for name, mask in self.regions.items()
+        }
         textures = {}
         for name, pixels in self.textures.items():
             _check_name("textures", name)
@@ -100,6 +126,7 @@ class Head:
         offsets = np.zeros((0, *shape)) if self.unit_offsets is None else self.unit_offsets
         offsets = check_array("unit_offsets", offsets, (len(self.unit_names), *shape))
         uncertainty = check_array("uncertainty_mm", self.uncertainty_mm, shape[:1])
+        object.__setattr__(self, "regions", regions)
         object.__setattr__(self, "textures", textures)
         object.__setattr__(self, "unit_offsets", frozen(offsets))
         object.__setattr__(self, "uncertainty_mm", frozen(uncertainty))

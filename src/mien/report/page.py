@@ -11,6 +11,7 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.camera import Camera
 from mien.model.deform import eye_centers
+from mien.model.expression.fit import ExpressionFit
 from mien.model.fit import Fit
 from mien.model.head import Head
 from mien.model.verdict import Mark, PhotoFit
@@ -38,7 +39,7 @@ class ReportInput:
 
     head: Head
     photos: Mapping[str, UInt8[Array, "h w 3"]]
-    fits: Mapping[str, Fit]
+    fits: Mapping[str, Fit | ExpressionFit]
     coverage: Float[Array, "h w"]
     notes: tuple[str, ...] = ()
     turntable: str = ""

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mien.arrays import Array, Bool, Float, UInt8
+from mien.arrays import Array, Bool, Float, Shaped, UInt8
 from mien.camera import Camera
 from mien.mesh import Mesh
+from mien.numeric.pyramid import fill_pyramid
 from mien.texture.atlas import fill_gutters
 from mien.texture.blend import Blend, blend_views
-from mien.texture.fill import fill_pyramid
 from mien.texture.parts import SEE_THROUGH, STYLES
 from mien.texture.subject import subject_mask
 from mien.texture.surface import SurfaceMap, over_vertices, parts_of
@@ -38,12 +38,14 @@ class ExpressionLook:
 
     Attributes:
         colours: (H, W, 3) float32, 0 to 255. share: (H, W) in [0, 1], how far they count.
+        seen: (H, W) in [0, 1], how far the photos themselves show them.
     """
 
     colours: Float[Array, "h w 3"]
     share: Float[Array, "h w"]
+    seen: Float[Array, "h w"]
 
-    def over(self, below: UInt8[Array, "h w 3"], surface: SurfaceMap) -> UInt8[Array, "h w 3"]:
+    def over(self, below: Shaped[Array, "h w 3"], surface: SurfaceMap) -> UInt8[Array, "h w 3"]:
         """The texture: these colours as far as they count, over what lies below."""
         mixed = below + self.share[..., None] * (self.colours - below)
         pixels = np.clip(np.rint(mixed), 0, 255).astype(np.uint8)
@@ -98,7 +100,8 @@ def look_at_expression(
     for texels, blend, reach_mm in everything:
         colours[texels], share[texels] = _spread(blend, texels, reach_mm / surface.texel_mm)
     share[skin] *= mask[skin]
-    return ExpressionLook(colours, share.astype(np.float32))
+    known = np.where(skin & ~inner, seen.confidence, narrow.confidence)
+    return ExpressionLook(colours, share.astype(np.float32), known)
 
 
 def _spread(

@@ -34,7 +34,7 @@ class PartStyle:
 
 SKIN = PartStyle("blend", "surface", (176, 138, 118))
 _EYEBALL = PartStyle("best", "white", (196, 186, 178), feather_mm=1.0, reach_mm=3.0)
-_TEETH = PartStyle("best", "default", (78, 54, 48), feather_mm=1.0)
+_TEETH = PartStyle("best", "default", (74, 67, 60), feather_mm=1.0)
 
 # The defaults are plain: sclera, mucosa and lashes as photographs usually show them. Teeth and
 # tongue that no photo shows are behind closed lips: they get enamel and mucosa in deep shadow, for
@@ -46,7 +46,7 @@ STYLES = {
     "right_eyeball": _EYEBALL,
     "upper_teeth": _TEETH,
     "lower_teeth": _TEETH,
-    "tongue": PartStyle("best", "default", (96, 46, 44), feather_mm=1.0),
+    "tongue": PartStyle("best", "default", (72, 36, 33), feather_mm=1.0),
     "lashes": PartStyle("none", "default", (38, 30, 26)),
     "hair": PartStyle("blend", "surface", (60, 48, 40)),
 }

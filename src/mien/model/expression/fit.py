@@ -54,6 +54,7 @@ class ExpressionFit:
     gaze: Float[Array, "2 2"]
     photos: dict[str, PhotoFit]
     left_out: dict[str, str]
+    notes: tuple[str, ...] = ()
 
 
 def fit_expression(

@@ -25,11 +25,13 @@ def iris_directions(
     """
     if view.landmarks is None:
         return None
+    places = generic.landmark_positions(vertices)
     directions = np.empty((2, 3))
     for row, (name, iris) in enumerate(EYEBALLS.items()):
         ball = vertices[np.unique(generic.mesh.triangles[generic.mesh.triangles_of(name)])]
         centre = ball.mean(axis=0)
-        radius = float(np.linalg.norm(ball - centre, axis=1).max())
+        # A person's eyeball is no sphere: what counts is how far from its centre the iris lies.
+        radius = float(np.linalg.norm(places[iris] - centre))
         ray = camera.ray_directions(view.landmarks.points[iris][None])[0]
         towards = centre - camera.center
         along = float(towards @ ray)
