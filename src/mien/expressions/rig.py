@@ -59,8 +59,9 @@ class Rig:
         )
         self._openings = Openings.of(generic, self._neutral)
         self._shading = head.shading
-        photographed = np.stack([self._openings.measure(item.vertices) for item in expressions])
-        self._photographed = brightness_at(photographed, self._shading)
+        self._photographed = np.stack([item.vertices for item in expressions])
+        openings = np.stack([self._openings.measure(item) for item in self._photographed])
+        self._photographed_light = brightness_at(openings, self._shading)
         self._shaded = _shaded_parts(generic)
 
     def evaluate(self, state: FaceState, *, contacts: bool = True) -> PosedFace:
@@ -85,7 +86,9 @@ class Rig:
             vertices += self._explained.residuals(self._spread(driven))
         vertices = self._turned_eyes(vertices, weights)
         moved = bool(units.any() or state.gaze.yaw or state.gaze.pitch)
-        if moved or not _one_expression(by_region):
+        if not moved and _one_expression(by_region):
+            vertices = self._photographed[int(by_region[0].argmax())]
+        else:
             vertices = self._mechanics.applied(vertices, state.units, state.gaze, contacts=contacts)
         return PosedFace(vertices, weights, self._brightness(vertices, weights))
 
@@ -159,7 +162,7 @@ class Rig:
         now = brightness_at(self._openings.measure(vertices), self._shading)
         brightness = np.ones(len(vertices))
         for column, part in enumerate(self._shaded):
-            there = weights[part[0]] @ self._photographed[:, column]
+            there = weights[part[0]] @ self._photographed_light[:, column]
             brightness[part] = now[column] / max(float(there), 0.1)
         return brightness
 

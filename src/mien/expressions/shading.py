@@ -21,7 +21,8 @@ _PRIOR_SD = (0.15, 0.6, 0.6)
 """How far a person's coefficients lie off the usual ones."""
 _NOISE = 0.08
 """Of a measured brightness."""
-_RANGE = (0.3, 3.0)
+_SCALE_SD = 0.01
+_RANGE = (0.25, 1.5)
 
 
 @dataclass(frozen=True)
@@ -86,8 +87,11 @@ def fit_polynomial(part: str, measured: Sequence[tuple[float, float, float]]) ->
     at, other = (np.clip(table[:, k], 0, MOST_OPEN[part]) for k in (0, 1))
     # ratio = p(o) / p(other): linear in the coefficients once multiplied out.
     rows = at[:, None] ** np.arange(3) - table[:, 2:] * other[:, None] ** np.arange(3)
-    normal = rows.T @ rows / _NOISE**2 + np.diag(1 / spread**2)
-    c0, c1, c2 = np.linalg.solve(normal, usual / spread**2).tolist()
+    # Ratios do not tell the scale, which is that of the usual polynomial, wide open.
+    wide = MOST_OPEN[part] ** np.arange(3)
+    normal = rows.T @ rows / _NOISE**2 + np.outer(wide, wide) / _SCALE_SD**2 + np.diag(spread**-2)
+    right = usual / spread**2 + wide * (wide @ usual) / _SCALE_SD**2
+    c0, c1, c2 = np.linalg.solve(normal, right).tolist()
     return c0, c1, c2
 
 
