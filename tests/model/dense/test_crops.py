@@ -6,6 +6,7 @@ import numpy as np
 
 from marbled import GENERIC, Person, at
 from mien.model.dense.crops import crop_view, finest_mm_per_px, visible_mesh
+from mien.numeric.raster import interpolate
 
 MESH = visible_mesh(GENERIC, GENERIC.mesh.vertices)
 CAMERA = at(10)
@@ -20,6 +21,17 @@ def test_places_of_the_crop_are_those_of_the_photo() -> None:
     assert np.abs(there - CAMERA.project(points)).max() < 0.8
     assert crop.grey.shape == crop.raster.triangle_ids.shape
     assert abs(crop.scale.mean() * 1.5 * CAMERA.focal_px / CAMERA.t_cam_head[2] - 1) < 0.05
+
+
+def test_the_surface_behind_a_pixel_is_what_the_photo_shows_there() -> None:
+    """Also where a whole number of pixels makes the crop a little wider than its scale says."""
+    for mm_per_px in (0.8, 1.1, 1.6, 2.3):
+        crop = crop_view(VIEW, CAMERA, MESH, mm_per_px)
+        assert crop is not None
+        rows, columns = np.nonzero(crop.raster.mask)
+        places = interpolate(crop.raster, MESH.triangles, MESH.vertices)[rows, columns]
+        there = crop.to_photo(np.column_stack([columns, rows]) + 0.5)
+        np.testing.assert_allclose(CAMERA.project(places), there, atol=0.01)
 
 
 def test_no_finer_than_the_photo() -> None:

@@ -82,11 +82,13 @@ def crop_view(view: View, camera: Camera, mesh: Mesh, mm_per_px: float) -> Crop 
         focal_px=camera.focal_px * scale,
         principal_px=(camera.principal - first) * scale,
     )
+    # Whole pixels stretch the image a little: the surface has to lie where the image shows it.
+    exact = size / (end - first)
     raster = rasterize(
-        small.project(mesh.vertices),
+        (camera.project(mesh.vertices) - first) * exact,
         small.to_camera(mesh.vertices)[:, 2],
         mesh.triangles,
         small.width,
         small.height,
     )
-    return Crop(grey.astype(np.float32), small, size / (end - first), first.astype(float), raster)
+    return Crop(grey.astype(np.float32), small, exact, first.astype(float), raster)
