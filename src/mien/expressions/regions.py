@@ -30,9 +30,12 @@ MASKS = ("left_mouth", "right_mouth", "left_eye", "right_eye", "left_forehead", 
 
 _MIDLINE_MM = 12.0
 """Width over which left gives way to right."""
+_RAMP = (0.3, 0.8)
+"""Between upper lid (0) and brow (1): where the eyes' region gives way to the forehead's."""
 _PARTS = {
-    "left_eyeball": "left_eye",
-    "right_eyeball": "right_eye",
+    "left_eyeball": "eyes",
+    "right_eyeball": "eyes",
+    "lashes": "eyes",
     "upper_teeth": "mouth",
     "lower_teeth": "mouth",
     "tongue": "mouth",
@@ -42,20 +45,53 @@ _PARTS = {
 def default_masks(generic: GenericHead) -> dict[str, Float[Array, " v"]]:
     """(V,) in [0, 1] by name of MASKS: a partition of the face with soft borders.
 
-    Eyes, teeth and tongue go with the region around them.
+    What lies behind the lips, the nostrils and the lids goes with them, as do teeth and tongue,
+    lashes and eyes. The border between eyes and forehead runs below the brows: across them, two
+    expressions would show two brows.
     """
-    left = _left_share(generic.mesh.vertices[:, 0])
-    whole = {name: generic.regions[name].astype(np.float64) for name in ("mouth", "forehead")}
-    masks = {f"left_{name}": left * mask for name, mask in whole.items()}
-    masks |= {f"right_{name}": (1 - left) * mask for name, mask in whole.items()}
-    masks |= {name: generic.regions[name].astype(np.float64) for name in ("left_eye", "right_eye")}
+    regions, left = generic.regions, _left_share(generic.mesh.vertices[:, 0])
+    mouth = np.maximum(regions["mouth"], regions["mouth_cavity"])
+    socket = regions["eye_socket"] * (1 - regions["mouth_cavity"])
+    eyes = np.maximum(regions["eyes"], socket)
+    forehead = regions["forehead"] + eyes * _above_lids(generic)
+    eyes = eyes * (1 - _above_lids(generic))
+    whole = {"mouth": mouth, "eyes": eyes, "forehead": forehead}
     for part, region in _PARTS.items():
         inside = np.unique(generic.mesh.triangles[generic.mesh.triangles_of(part)])
-        for name, mask in masks.items():
-            share = left if name.startswith("left_") else 1 - left
-            belongs = name == region or region in AROUND[name]
-            mask[inside] = (share[inside] if region == "mouth" else 1.0) if belongs else 0.0
+        for name, mask in whole.items():
+            mask[inside] = name == region
+    total = np.maximum(sum(whole.values()), 1.0)
+    masks: dict[str, Float[Array, " v"]] = {}
+    for name, mask in whole.items():
+        half = "eye" if name == "eyes" else name
+        masks[f"left_{half}"] = left * mask / total
+        masks[f"right_{half}"] = (1 - left) * mask / total
     return {name: masks[name] for name in MASKS}
+
+
+def _above_lids(generic: GenericHead) -> Float[Array, " v"]:
+    """(V,) from 0 at the upper lids to 1 at the lower edge of the brows and above."""
+    vertices = generic.mesh.vertices
+    above = np.zeros(len(vertices))
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        lid, brow = (
+            vertices[list(generic.polylines[f"{side}_{line}"])]
+            for line in ("upper_eyelid", "eyebrow_lower")
+        )
+        mine = sign * vertices[:, 0] >= 0
+        heights = [
+            np.interp(sign * vertices[:, 0], *_rising(sign * line[:, 0], line[:, 1]))
+            for line in (lid, brow)
+        ]
+        t = (vertices[:, 1] - heights[0]) / np.maximum(heights[1] - heights[0], 1.0)
+        t = np.clip((t - _RAMP[0]) / (_RAMP[1] - _RAMP[0]), 0, 1)
+        above[mine] = (t * t * (3 - 2 * t))[mine]
+    return above
+
+
+def _rising(x: Float[Array, " n"], y: Float[Array, " n"]) -> tuple[Array, Array]:
+    order = np.argsort(x)
+    return x[order], y[order]
 
 
 def check_masks(masks: Mapping[str, object], vertices: int) -> dict[str, Float[Array, " v"]]:
