@@ -46,7 +46,10 @@ def _place(
     width, height = view.photo.size
     centred = image - [width / 2, height / 2]
     lens = np.diag([focal_px, focal_px, 1.0])
-    solved, turn, shift = cv2.solvePnP(places, centred, lens, None, flags=cv2.SOLVEPNP_SQPNP)
+    try:
+        solved, turn, shift = cv2.solvePnP(places, centred, lens, None, flags=cv2.SOLVEPNP_SQPNP)
+    except cv2.error:  # Points that lie in one place.
+        solved = False
     if not solved or shift[2, 0] <= 0:
         raise EstimationError(f"{view.photo.name}: no camera sees its points so")
     rotation, _ = cv2.Rodrigues(turn)
