@@ -95,8 +95,9 @@ def _surface(
     detail = level_of_detail(painted.texels, points, painted.triangles)
     # One lookup a pixel, with a filter as wide as that of a lookup at every sample.
     detail += np.log2(factor) + 0.5 * np.log2((1 + 2 / factor**2) / 3)
-    shades = np.column_stack([detail, brightness, weights]).astype(np.float32)
     faces, textures = len(painted.triangles), weights.shape[1]
+    shades = np.empty((len(points), 2 + textures), np.float32)
+    shades[:, 0], shades[:, 1], shades[:, 2:] = detail, brightness, weights
     mixed, mixes = np.empty((faces, textures), np.int32), np.zeros(faces, np.int32)
     _list_textures(painted.triangles, shades, mixed, mixes)
     return Surface(painted.uvs, shades, mixed, mixes)
@@ -215,7 +216,7 @@ def _list_mixed(
 B0, B1, B2, U, V, LEVEL, BRIGHTNESS = range(7)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
 def _find_places(
     coverage: Coverage,
     surface: Surface,
@@ -239,7 +240,7 @@ def _find_places(
         places[f, BRIGHTNESS] = b0 * shades[i, 1] + b1 * shades[j, 1] + b2 * shades[k, 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
 def _add_colours(
     triangles: Array,
     surface: Surface,
