@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -228,7 +228,17 @@ def _with_textures(
     tell(stage, 3, total)
     textures = {head.expressions[name].texture: pixels for name, pixels in looks.textures.items()}
     textures[CYLINDER] = cylinder.pixels
-    return replace(head, textures=textures, shading=looks.shading), base.coverage
+    gains = looks.gains | {NEUTRAL: base.gains}
+    expressions = {
+        name: replace(item, views=_with_gains(item.views, gains[name]))
+        for name, item in head.expressions.items()
+    }
+    head = replace(head, expressions=expressions, textures=textures, shading=looks.shading)
+    return head, base.coverage
+
+
+def _with_gains(views: Sequence[FittedView], gains: Float[Array, "k 3"]) -> tuple[FittedView, ...]:
+    return tuple(replace(view, gains=own) for view, own in zip(views, gains, strict=True))
 
 
 def _extract(head: Head, capture: Capture, name: str, surface: SurfaceMap, fill: Fill) -> Texture:

@@ -26,6 +26,7 @@ from mien.mesh import Mesh
 from mien.model.head import NEUTRAL
 from mien.texture.atlas import atlas_surface
 from mien.texture.expression import ExpressionLook, look_at_expression
+from mien.texture.parts import SKIN
 from mien.texture.surface import SurfaceMap, parts_of
 
 _GROUPS: Mapping[str, tuple[int, str]] = {
@@ -36,7 +37,9 @@ _GROUPS: Mapping[str, tuple[int, str]] = {
     "tongue": (2, TEETH),
 }
 """The parts in the shadow of lids and lips: which opening and which polynomial is theirs."""
+_MOUTH = 2
 _SEEN = 0.9
+_TINTS = (0.4, 1.2)
 _ENOUGH = 60
 """Texels of a part that two expressions must both show for their brightness to be compared."""
 
@@ -56,10 +59,16 @@ class Photographed:
 
 @dataclass(frozen=True)
 class Looks:
-    """Textures by expression and the shading of eyes and teeth."""
+    """How a person looks in each expression.
+
+    Attributes:
+        textures: (H, W, 3) by expression. shading: of eyes and teeth.
+        gains: (K, 3) by expression, what each photo's colours were multiplied by.
+    """
 
     textures: dict[str, UInt8[Array, "h w 3"]]
     shading: dict[str, Polynomial]
+    gains: dict[str, Float[Array, "k 3"]]
 
 
 def paint_expressions(
@@ -92,7 +101,7 @@ def paint_expressions(
             texels = parts_of(surface, mesh, part)
             below[texels] = common[texels] * light[name][column]
         textures[name] = look.over(below, surface)
-    return Looks(textures, shading)
+    return Looks(textures, shading, {name: look.gains for name, look in looks.items()})
 
 
 def _look(
@@ -112,7 +121,7 @@ def _look(
         surface=atlas_surface(mesh, width=width, height=height),
         below=base,
         within=within,
-        cavity=regions["mouth_cavity"],
+        inside=np.maximum(regions["mouth_cavity"], regions["eye_socket"]),
     )
 
 
@@ -149,6 +158,12 @@ def _fit_shading(
     return {kind: fit_polynomial(kind, pairs) for kind, pairs in measured.items()}
 
 
+def _tint(surface: SurfaceMap, mesh: Mesh, base: UInt8[Array, "h w 3"]) -> Float[Array, " 3"]:
+    """(3,) by how much the person's skin is darker or warmer than skin usually is in photos."""
+    skin = base[parts_of(surface, mesh, "skin")]
+    return np.clip(np.median(skin, axis=0) / np.array(SKIN.default), *_TINTS)
+
+
 def _by_seen(looks: Mapping[str, ExpressionLook], texels: Bool[Array, "h w"]) -> list[str]:
     """The expressions from the one that shows least of the texels to the one that shows most."""
     return sorted(looks, key=lambda name: float(looks[name].seen[texels].sum()))
@@ -169,11 +184,15 @@ def _common_parts(
     base: UInt8[Array, "h w 3"],
 ) -> Float[Array, "h w 3"]:
     """(H, W, 3) eyes and teeth in full light: from the expression that shows most of each, then
-    from the next, and what none shows from neutral's texture."""
+    from the next, and what none shows from neutral's texture, which for teeth and tongue is a
+    colour for usual light: it takes on the light that is on the skin."""
     common = base.astype(np.float32)
+    tint = _tint(surface, mesh, base)
     for part, (column, _) in _GROUPS.items():
         texels = parts_of(surface, mesh, part)
         colours = common[texels] / light[NEUTRAL][column]
+        if column == _MOUTH:
+            colours *= tint
         for name in _by_seen(looks, texels):
             share = looks[name].share[texels][:, None]
             own = looks[name].colours[texels] / light[name][column]

@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.errors import InputError
-from mien.expressions.basis import check_weights, outside_hull
+from mien.expressions.basis import WEIGHT_RANGE, check_weights, outside_hull
 from mien.expressions.contacts import Mechanics
 from mien.expressions.explained import Explanations
 from mien.expressions.followers import part_vertices
@@ -63,6 +63,10 @@ class Rig:
         openings = np.stack([self._openings.measure(item) for item in self._photographed])
         self._photographed_light = brightness_at(openings, self._shading)
         self._shaded = _shaded_parts(generic)
+        # Where eyes look in a photograph has nothing to do with the units that it shows.
+        self._skin = np.ones(len(self._neutral))
+        for eyeball in self._mechanics.look.eyeballs:
+            self._skin[eyeball.vertices] = 0
 
     def evaluate(self, state: FaceState, *, contacts: bool = True) -> PosedFace:
         """The face in this state.
@@ -77,14 +81,13 @@ class Rig:
         units = self._unit_weights(state.units)
         linear = self._neutral + np.tensordot(units, self._units, axes=1)
         driven = self._explained.driven(units) * np.clip(by_region[:, :1], 0, 1)
-        textured = by_region.copy()
-        textured[:, 1:] += driven
-        textured[:, 0] -= driven.sum(axis=1)
-        weights = self._spread(textured)
-        vertices = linear + np.einsum("vk,kvc->vc", self._spread(by_region), self._offsets)
-        if driven.any():
-            vertices += self._explained.residuals(self._spread(driven))
+        weights = self._spread(by_region)
+        vertices = linear + np.einsum("vk,kvc->vc", weights, self._offsets)
         vertices = self._turned_eyes(vertices, weights)
+        if driven.any():
+            along = self._spread(driven) * self._skin[:, None]
+            vertices += self._explained.residuals(along)
+            weights = weights + np.column_stack([-along.sum(axis=1), along])
         moved = bool(units.any() or state.gaze.yaw or state.gaze.pitch)
         if not moved and _one_expression(by_region):
             vertices = self._photographed[int(by_region[0].argmax())]
@@ -93,13 +96,14 @@ class Rig:
         return PosedFace(vertices, weights, self._brightness(vertices, weights))
 
     def hull_notes(self, state: FaceState) -> tuple[str, ...]:
-        """What a state asks for beyond the expressions that were photographed."""
-        weights = self._region_weights(state.expressions)
-        notes = [
-            (name, outside_hull(row, self.names))
-            for name, row in zip((*MASKS, FACE), weights, strict=True)
-        ]
-        return tuple(f"{name}: {note}" for name, note in notes if note)
+        """What a state asks for beyond the expressions that were photographed, by its regions.
+
+        Raises: InputError: as evaluate, for expressions and their weights.
+        """
+        self._region_weights(state.expressions)
+        weights = {region: self._weights(given) for region, given in state.expressions.items()}
+        notes = {region: outside_hull(row, self.names) for region, row in weights.items()}
+        return tuple(f"{region}: {note}" for region, note in notes.items() if note)
 
     def _region_weights(
         self, expressions: Mapping[str, Mapping[str, float]]
@@ -122,6 +126,11 @@ class Rig:
             weights[self.names.index(name)] = weight
         if NEUTRAL not in given:
             weights[0] = 1 - weights.sum()
+        low, high = WEIGHT_RANGE
+        for name in (*given, NEUTRAL):
+            weight = weights[self.names.index(name)]
+            if not low - 1e-6 <= weight <= high + 1e-6:
+                raise InputError(f"weight of {name}", f"{low} to {high}", f"{weight:g}")
         return check_weights(weights)
 
     def _unit_weights(self, given: Mapping[str, float]) -> Float[Array, " u"]:

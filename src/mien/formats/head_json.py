@@ -166,6 +166,7 @@ def _view_to_json(view: FittedView) -> Json:
         "rms_px": float(view.rms_px),
         "points_used": int(view.points_used),
         "distrusted": dict(view.distrusted),
+        "gains": view.gains.tolist(),
     }
 
 
@@ -186,6 +187,7 @@ def _view_from_json(item: object, place: str) -> FittedView:
         rms_px=get(item, "rms_px", float, place),
         points_used=get(item, "points_used", int, place),
         distrusted=get_texts(item, "distrusted", place),
+        gains=_get_array(item, "gains", (3,), place) if "gains" in item else np.ones(3),
     )
 
 

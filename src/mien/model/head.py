@@ -30,6 +30,8 @@ class FittedView:
         rms_px: root mean square reprojection error of the points used.
         points_used: how many points of this photo the camera and the shape rest on.
         distrusted: why, by point name, for every point that was seen and not used.
+        gains: (3,) what its colours were multiplied by on the way into the texture, so that photos
+            of different exposure agree.
     Raises: InputError: an error that is negative or not finite, a negative count.
     """
 
@@ -38,8 +40,13 @@ class FittedView:
     rms_px: float
     points_used: int
     distrusted: dict[str, str] = field(default_factory=dict)
+    gains: Float[Array, " 3"] = field(default_factory=lambda: np.ones(3))
 
     def __post_init__(self) -> None:
+        gains = check_array("gains", self.gains, (3,))
+        if gains.min() <= 0:
+            raise InputError("gains", "numbers above 0", gains.min())
+        object.__setattr__(self, "gains", frozen(gains))
         if not (np.isfinite(self.rms_px) and self.rms_px >= 0):
             raise InputError("rms_px", "a number from 0 up", self.rms_px)
         if self.points_used < 0:

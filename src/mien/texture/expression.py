@@ -16,7 +16,7 @@ from mien.texture.blend import Blend, blend_views
 from mien.texture.parts import SEE_THROUGH, STYLES
 from mien.texture.subject import subject_mask
 from mien.texture.surface import SurfaceMap, over_vertices, parts_of
-from mien.texture.visibility import View, prepare_view
+from mien.texture.visibility import View, feather, prepare_view
 
 FEATHER_MM = 3.0
 _FADE = (0.05, 0.2)
@@ -27,6 +27,7 @@ _REACH_MM, _SKIN_REACH_MM = 6.0, 2.0
 """How far what is seen goes on where nothing is seen."""
 _PARTS_FEATHER_MM = 0.7
 """Eyes and teeth are seen through slits: little of them would be left of a wider ramp."""
+_RAMP_MM, _SLIT_MM = 14.0, 3.0
 _ENOUGH = 2000
 """Texels that both show for their exposures to be compared."""
 _MOST_GAIN = 1.6
@@ -39,11 +40,13 @@ class ExpressionLook:
     Attributes:
         colours: (H, W, 3) float32, 0 to 255. share: (H, W) in [0, 1], how far they count.
         seen: (H, W) in [0, 1], how far the photos themselves show them.
+        gains: (K, 3) what each photo's colours were multiplied by.
     """
 
     colours: Float[Array, "h w 3"]
     share: Float[Array, "h w"]
     seen: Float[Array, "h w"]
+    gains: Float[Array, "k 3"]
 
     def over(self, below: Shaped[Array, "h w 3"], surface: SurfaceMap) -> UInt8[Array, "h w 3"]:
         """The texture: these colours as far as they count, over what lies below."""
@@ -61,7 +64,7 @@ def look_at_expression(
     surface: SurfaceMap,
     below: UInt8[Array, "h w 3"],
     within: Float[Array, " v"],
-    cavity: Float[Array, " v"],
+    inside: Float[Array, " v"],
 ) -> ExpressionLook:
     """What photos show of an expression on the head's own texture map.
 
@@ -70,7 +73,7 @@ def look_at_expression(
         below: (H, W, 3) neutral's texture: exposures are matched to it.
         within: (V,) in [0, 1], where skin may differ from neutral's: P02's facial mask (sec.
             6.1.1); hair and neck are neutral's for all expressions.
-        cavity: (V,) in [0, 1], skin that shows through the open mouth alone.
+        inside: (V,) in [0, 1], skin behind lips and lids.
     """
     solid = mesh.submesh(
         mesh.triangles_of(*(name for name in mesh.part_names if name not in SEE_THROUGH))
@@ -93,15 +96,29 @@ def look_at_expression(
     gains = _gains(surface, views, below, skin & (mask > 0.5))
     seen = blend_views(surface, views, gains, feather_mm=FEATHER_MM, fade=_FADE)
     narrow = blend_views(surface, views, gains, feather_mm=_PARTS_FEATHER_MM, fade=_FADE)
-    inner = skin & (over_vertices(surface, mesh, cavity[:, None])[..., 0] > 0.5)
+    inner = skin & (over_vertices(surface, mesh, inside[:, None])[..., 0] > 0.5)
     colours, share = np.zeros_like(seen.colours), np.zeros_like(seen.confidence)
     everything = [(skin & ~inner, seen, _SKIN_REACH_MM), (inner, narrow, _REACH_MM)]
     everything += [(parts_of(surface, mesh, name), narrow, _REACH_MM) for name in _PARTS]
     for texels, blend, reach_mm in everything:
         colours[texels], share[texels] = _spread(blend, texels, reach_mm / surface.texel_mm)
+    outer = skin & ~inner
+    share[outer] *= _ramp(seen, outer, surface)[outer]
     share[skin] *= mask[skin]
-    known = np.where(skin & ~inner, seen.confidence, narrow.confidence)
-    return ExpressionLook(colours, share.astype(np.float32), known)
+    known = np.where(outer, seen.confidence, narrow.confidence)
+    return ExpressionLook(colours, share.astype(np.float32), known, gains)
+
+
+def _ramp(seen: Blend, outer: Bool[Array, "h w"], surface: SurfaceMap) -> Float[Array, "h w"]:
+    """(H, W) from 0 where the photos end to 1: wide, for light and exposure differ a little. At
+    lips and lids, whose surroundings are seen from both sides, they do not end."""
+    import cv2
+
+    size = 2 * round(_SLIT_MM / surface.texel_mm) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    shown = ((seen.confidence > 0.5) | ~outer).astype(np.uint8)
+    closed = cv2.morphologyEx(shown, cv2.MORPH_CLOSE, disc)
+    return feather(closed > 0, _RAMP_MM / surface.texel_mm)
 
 
 def _spread(
