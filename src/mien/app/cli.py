@@ -10,7 +10,13 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from mien.app.options import check_finite, parse_amounts, parse_colour, parse_size
+from mien.app.options import (
+    check_finite,
+    parse_colour,
+    parse_count,
+    parse_size,
+    parse_state,
+)
 from mien.app.progress import terminal_progress
 from mien.errors import MienError
 
@@ -29,6 +35,8 @@ FillChoice = Literal["pyramid", "grow"]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, no bars.")]
 Output = Annotated[Path, typer.Option("-o", "--output", help="Where the result goes.")]
 HeadFolder = Annotated[Path, typer.Argument(help="A head folder that `mien build` made.")]
+Yaw = Annotated[float, typer.Option(help="Degrees; the head turns to its own left.")]
+Pitch = Annotated[float, typer.Option(help="Degrees; the head tips down.")]
 
 
 @app.command()
@@ -80,8 +88,15 @@ def build(
         typer.Option(min=1, help="Which face, from left to right from 1; the largest by default."),
     ] = None,
     frames: Annotated[
-        int, typer.Option(min=1, max=24, help="How many frames to pick from a video.")
+        int, typer.Option(min=1, max=24, help="How many frames at rest to pick from a video.")
     ] = 7,
+    expressions: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N|none",
+            help="How many expressions to pick from a video; whatever differs by default.",
+        ),
+    ] = None,
     json_: Json = False,
 ) -> None:
     """Photos to a head folder: cameras, shape, texture and a report."""
@@ -101,6 +116,7 @@ def build(
         texture_size=texture_size,
         face=face,
         frames=frames,
+        expressions=parse_count("--expressions", expressions),
     )
     with terminal_progress(json_) as progress:
         result = build_head_folder(source, output, options=options, progress=progress)
@@ -111,15 +127,31 @@ def build(
 def render(
     head: HeadFolder,
     output: Output,
-    yaw: Annotated[float, typer.Option(help="Degrees; the head turns to its own left.")] = 0.0,
-    pitch: Annotated[float, typer.Option(help="Degrees; the head tips down.")] = 0.0,
+    yaw: Yaw = 0.0,
+    pitch: Pitch = 0.0,
     roll: Annotated[float, typer.Option(help="Degrees; the head tips to its own right.")] = 0.0,
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in px.")] = "800x1000",
     camera: Annotated[
-        str | None, typer.Option(metavar="PHOTO", help="Reproduce the view of this photo.")
+        str | None,
+        typer.Option(metavar="PHOTO", help="Reproduce the view of this photo, expression too."),
+    ] = None,
+    expression: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=AMOUNT", help="A photographed expression, as joy=0.6."),
+    ] = None,
+    region: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="REGION:NAME=AMOUNT",
+            help="One in a region, instead of the face's there, as mouth:anger=0.4.",
+        ),
     ] = None,
     unit: Annotated[
         list[str] | None, typer.Option(metavar="NAME=AMOUNT", help="A face unit, as jawOpen=0.5.")
+    ] = None,
+    gaze: Annotated[
+        str | None,
+        typer.Option(metavar="YAW,PITCH", help="Degrees; the eyes look to their own left, and up."),
     ] = None,
     background: Annotated[
         str | None, typer.Option(metavar="COLOUR", help="As #204060; transparent by default.")
@@ -129,37 +161,95 @@ def render(
     """A picture of the head, with alpha."""
     from mien.formats.head_folder import load_head
     from mien.formats.image import save_image
-    from mien.render.picture import render_head
+    from mien.render.picture import HeadRenderer, render_head
 
     width_height = parse_size("--size", size)
-    units = parse_amounts("--unit", unit or [])
-    angles = [
-        radians(check_finite(name, angle))
-        for name, angle in (("--yaw", yaw), ("--pitch", pitch), ("--roll", roll))
-    ]
+    state = parse_state(expression, region, unit, gaze)
     colour = None if background is None else parse_colour("--background", background)
+    angles = [_angle("--yaw", yaw), _angle("--pitch", pitch), _angle("--roll", roll)]
+    renderer = HeadRenderer(load_head(head))
     picture = render_head(
-        load_head(head),
+        renderer,
         yaw=angles[0],
         pitch=angles[1],
         roll=angles[2],
         size=width_height,
         photo=camera,
-        units=units,
+        state=state,
         background=colour,
     )
     save_image(output, picture)
-    _print(json_, {"output": str(output)}, str(output))
+    notes = renderer.rig.hull_notes(state)
+    _print(json_, {"output": str(output), "notes": notes}, str(output), notes)
 
 
 @app.command()
-def export(head: HeadFolder, output: Output, json_: Json = False) -> None:
-    """The head as .glb, .obj or .usdz, face units included."""
+def export(
+    head: HeadFolder,
+    output: Output,
+    expression: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Which expression an .obj shows; others hold them all."),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """The head as .glb, .obj or .usdz, face units and expressions included."""
     from mien.formats.export import export_head
     from mien.formats.head_folder import load_head
+    from mien.model.head import NEUTRAL
 
-    export_head(load_head(head), output)
+    export_head(load_head(head), output, expression=expression or NEUTRAL)
     _print(json_, {"output": str(output), "bytes": output.stat().st_size}, str(output))
+
+
+@app.command()
+def animate(
+    timeline: Annotated[
+        Path, typer.Argument(help="A timeline (.json) or a Live Link Face recording (.csv).")
+    ],
+    output: Annotated[
+        str,
+        typer.Option(
+            "-o",
+            "--output",
+            help="X.mp4, .webm, .glb, .usdz, .csv, .fap, or a folder for pictures.",
+        ),
+    ],
+    head: Annotated[Path, typer.Option(help="A head folder that `mien build` made.")],
+    fps: Annotated[
+        float | None, typer.Option(help="Frames a second; the timeline's by default.")
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(help="WIDTHxHEIGHT in px; the timeline's by default.")
+    ] = None,
+    yaw: Yaw = 0.0,
+    pitch: Pitch = 0.0,
+    background: Annotated[
+        str | None,
+        typer.Option(metavar="COLOUR", help="As #204060; transparent, in an .mp4 grey by default."),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """The head performs a timeline: a video, pictures, a model that moves, or its numbers."""
+    from mien.app.animate import animate_head
+    from mien.formats.head_folder import load_head
+
+    width_height = None if size is None else parse_size("--size", size)
+    colour = None if background is None else parse_colour("--background", background)
+    with terminal_progress(json_) as progress:
+        take = animate_head(
+            load_head(head),
+            timeline,
+            output,
+            fps=None if fps is None else check_finite("--fps", fps),
+            size=width_height,
+            yaw=_angle("--yaw", yaw),
+            pitch=_angle("--pitch", pitch),
+            background=colour,
+            progress=progress,
+        )
+    data = {"output": output, "frames": take.frames, "notes": take.notes}
+    _print(json_, data, f"{output}: {take.frames} frames", take.notes)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -188,5 +278,12 @@ def _one_line(error: Exception) -> str:
     return " ".join(text.split())
 
 
-def _print(as_json: bool, data: dict[str, Any], text: str) -> None:
+def _angle(name: str, degrees: float) -> float:
+    return radians(check_finite(name, degrees))
+
+
+def _print(as_json: bool, data: dict[str, Any], text: str, notes: tuple[str, ...] = ()) -> None:
+    """The result on stdout; notes, which the JSON has in it, on stderr."""
     print(json.dumps(data, indent=2) if as_json else text)
+    for note in () if as_json else notes:
+        print("note:", note, file=sys.stderr)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, radians
+from typing import TYPE_CHECKING
 
 from mien.errors import InputError
+
+if TYPE_CHECKING:
+    from mien.expressions.state import FaceState
 
 MAX_SIDE = 8192
 """Of a rendered picture, px."""
@@ -27,7 +31,9 @@ def parse_size(name: str, text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def parse_amounts(name: str, texts: list[str]) -> dict[str, float]:
+def parse_amounts(
+    name: str, texts: list[str], *, expected: str = "NAME=AMOUNT, as jawOpen=0.5"
+) -> dict[str, float]:
     """`["jawOpen=0.5"]` to {"jawOpen": 0.5}. Raises: InputError."""
     amounts = {}
     for text in texts:
@@ -36,9 +42,61 @@ def parse_amounts(name: str, texts: list[str]) -> dict[str, float]:
             if not (key and equals and isfinite(float(value))):
                 raise ValueError
         except ValueError:
-            raise InputError(name, "NAME=AMOUNT, as jawOpen=0.5", text) from None
+            raise InputError(name, expected, text) from None
         amounts[key] = float(value)
     return amounts
+
+
+def parse_regions(name: str, texts: list[str]) -> dict[str, dict[str, float]]:
+    """`["mouth:anger=0.4"]` to {"mouth": {"anger": 0.4}}. Raises: InputError."""
+    expected = "REGION:NAME=AMOUNT, as mouth:anger=0.4"
+    regions: dict[str, dict[str, float]] = {}
+    for key, amount in parse_amounts(name, texts, expected=expected).items():
+        region, colon, expression = key.partition(":")
+        if not (region and colon and expression):
+            raise InputError(name, expected, f"{key}={amount:g}")
+        regions.setdefault(region, {})[expression] = amount
+    return regions
+
+
+def parse_angles(name: str, text: str) -> tuple[float, float]:
+    """`10,-5` in degrees to radians. Raises: InputError."""
+    try:
+        yaw, pitch = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(name, "YAW,PITCH in degrees, as 10,-5", text) from None
+    return radians(check_finite(name, yaw)), radians(check_finite(name, pitch))
+
+
+def parse_state(
+    expressions: list[str] | None,
+    regions: list[str] | None,
+    units: list[str] | None,
+    gaze: str | None,
+) -> FaceState:
+    """What a face does, by the options of `mien render`. Raises: InputError."""
+    from mien.expressions.state import FACE, FaceState, Gaze
+
+    everywhere = parse_amounts(
+        "--expression", expressions or [], expected="NAME=AMOUNT, as joy=0.6"
+    )
+    by_region = parse_regions("--region", regions or [])
+    if everywhere:
+        by_region[FACE] = everywhere | by_region.get(FACE, {})
+    amounts = parse_amounts("--unit", units or [])
+    yaw, pitch = (0.0, 0.0) if gaze is None else parse_angles("--gaze", gaze)
+    return FaceState(by_region, amounts, Gaze(yaw, pitch))
+
+
+def parse_count(name: str, text: str | None) -> int | None:
+    """`none` to 0, `5` to 5, nothing to None. Raises: InputError."""
+    if text is None:
+        return None
+    if text.lower() == "none":
+        return 0
+    if not (text.isascii() and text.isdecimal() and int(text)):
+        raise InputError(name, "a number from 1 up, or none", text)
+    return int(text)
 
 
 def parse_colour(name: str, text: str) -> tuple[int, int, int]:

@@ -37,6 +37,8 @@ def summary_text(result: Build, folder: Path) -> str:
         f"  {view.photo}: {view.points_used} points, off by {view.rms_px:.1f} px (RMS)"
         for view in result.head.views
     ]
+    if len(result.head.expressions) > 1:
+        lines.insert(0, f"  expressions: {', '.join(result.head.expressions)}")
     lines += [f"  note: {note}" for note in result.notes]
     return "\n".join(
         [

@@ -1,62 +1,98 @@
-"""A picture of a head as a user asks for it."""
+"""Pictures of a head as a user asks for them."""
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
-from mien.arrays import Array, Float, UInt8
-from mien.errors import InputError
-from mien.model.head import ATLAS, Head
+from mien.arrays import Array, UInt8
+from mien.camera import Camera
+from mien.expressions.rig import Rig
+from mien.expressions.state import FACE, FaceState
+from mien.model.head import Head
+from mien.render.morph import MorphRenderer
 from mien.render.orbit import orbit_camera, turntable
-from mien.render.shade import render
+
+
+class HeadRenderer:
+    """Draws one head in any state; what all its pictures share is prepared once.
+
+    Attributes:
+        head: the head. rig: what poses its face.
+    Raises: InputError: as Rig.
+    """
+
+    def __init__(self, head: Head) -> None:
+        self.head, self.rig = head, Rig(head)
+
+    @cached_property
+    def _renderer(self) -> MorphRenderer:
+        return MorphRenderer(self.head.mesh, self.rig.textures)
+
+    def camera(
+        self,
+        yaw: float = 0.0,
+        pitch: float = 0.0,
+        roll: float = 0.0,
+        *,
+        size: tuple[int, int] = (800, 1000),
+    ) -> Camera:
+        """The camera that sees the head turned like this (radians, docs/conventions.md).
+
+        Framed by the neutral head, so that an open mouth does not change the scale.
+        """
+        width, height = size
+        vertices = self.head.mesh.vertices
+        return orbit_camera(-yaw, pitch, roll, width=width, height=height, vertices=vertices)
+
+    def draw(
+        self,
+        state: FaceState,
+        camera: Camera,
+        *,
+        background: tuple[int, int, int] | UInt8[Array, "h w 3"] | None = None,
+    ) -> UInt8[Array, "h w 4"]:
+        """(H, W, 4) sRGB with straight alpha. Raises: InputError: what the head cannot do."""
+        face = self.rig.evaluate(state)
+        return self._renderer.render(face, camera, samples=4, background=background)
 
 
 def render_head(
-    head: Head,
+    head: Head | HeadRenderer,
     *,
     yaw: float = 0.0,
     pitch: float = 0.0,
     roll: float = 0.0,
     size: tuple[int, int] = (800, 1000),
     photo: str | None = None,
-    units: Mapping[str, float] | None = None,
+    state: FaceState | None = None,
     background: tuple[int, int, int] | None = None,
 ) -> UInt8[Array, "h w 4"]:
     """The textured head, RGBA.
 
     Args:
+        head: or what HeadRenderer prepared of it, for many pictures of one head.
         yaw, pitch, roll: radians, as docs/conventions.md says.
         size: width and height in px; with `photo`, the photo's own.
-        photo: reproduce the camera of this photo instead of turning the head.
-        units: weights of face units by name; 0 to 1 is their usual range.
+        photo: reproduce the view of this photo instead of turning the head: its camera and, unless
+            the state says which expressions to mix, the expression that it belongs to.
+        state: what the face does; nothing by default.
         background: sRGB; transparent unless given.
-    Raises: InputError: no such photo or unit.
+    Raises: InputError: no such photo, region, expression or unit; weights outside [-0.5, 1.5].
     """
-    mesh = head.mesh.with_vertices(with_units(head, units or {}))
-    if photo is not None:
-        camera = head.view(photo).camera
+    renderer = head if isinstance(head, HeadRenderer) else HeadRenderer(head)
+    state = state or FaceState()
+    if photo is None:
+        camera = renderer.camera(yaw, pitch, roll, size=size)
     else:
-        width, height = size
-        # Framed by the neutral head, so that an open mouth does not change the scale.
-        camera = orbit_camera(
-            -yaw, pitch, roll, width=width, height=height, vertices=head.mesh.vertices
-        )
-    return render(mesh, camera, head.textures[ATLAS], samples=4, background=background)
-
-
-def with_units(head: Head, units: Mapping[str, float]) -> Float[Array, "v 3"]:
-    """(V, 3) mm: the neutral shape with face units added. Raises: InputError: no such unit."""
-    vertices = np.array(head.mesh.vertices)
-    for name, weight in units.items():
-        if name not in head.unit_names:
-            close = difflib.get_close_matches(name, head.unit_names, n=3)
-            expected = "a face unit" + (f" such as {', '.join(close)}" if close else "")
-            raise InputError("unit", expected, name)
-        vertices += weight * head.units[head.unit_names.index(name)]
-    return vertices
+        camera = renderer.head.view(photo).camera
+        if not state.expressions:
+            shown = {FACE: {_expression_of(renderer.head, photo): 1.0}}
+            state = replace(state, expressions=shown)
+    return renderer.draw(state, camera, background=background)
 
 
 def turntable_frames(
@@ -67,7 +103,16 @@ def turntable_frames(
     background: tuple[int, int, int] = (72, 74, 84),
 ) -> Iterator[UInt8[Array, "h w 3"]]:
     """The head once around, one picture at a time."""
-    width, height = size
+    renderer, (width, height) = HeadRenderer(head), size
     for camera in turntable(frames, width=width, height=height, vertices=head.mesh.vertices):
-        picture = render(head.mesh, camera, head.textures[ATLAS], samples=4, background=background)
-        yield picture[..., :3]
+        picture = renderer.draw(FaceState(), camera, background=background)
+        yield np.ascontiguousarray(picture[..., :3])
+
+
+def _expression_of(head: Head, photo: str) -> str:
+    """The expression that a fitted photo belongs to."""
+    return next(
+        name
+        for name, expression in head.expressions.items()
+        if any(view.photo == photo for view in expression.views)
+    )
