@@ -178,9 +178,8 @@ def _write_model(job: _Job, path: str | Path) -> int:
 def _write_live_link(job: _Job, path: str | Path) -> int:
     from mien.formats.live_link import write_live_link
 
-    return write_live_link(
-        path, job.moments(), units_of=lambda state: units_of(job.renderer.head, state)
-    )
+    head = job.renderer.head
+    return write_live_link(path, job.moments(), units_of=lambda state: units_of(head, state))
 
 
 def _write_fap(job: _Job, path: str | Path) -> int:

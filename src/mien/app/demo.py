@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import shutil
 from importlib.resources import files
 from math import radians
 from pathlib import Path
 from typing import TypedDict
 
+from mien.animate.sample import SAMPLE_TIMELINE
+from mien.app.animate import animate_head
 from mien.build import TURNTABLE, Progress, build_head_folder
+from mien.expressions.state import FaceState
 from mien.formats.atomic import atomic_folder, check_folder_place
 from mien.formats.export import export_head
 from mien.formats.head_folder import is_head_folder
 from mien.formats.image import save_image
 from mien.model.head import Head
-from mien.render.picture import render_head
+from mien.render.picture import HeadRenderer, render_head
 
 
 class _Look(TypedDict):
@@ -34,6 +38,9 @@ UNITS = {
     "brows up": {"browInnerUp": 1.0, "browOuterUpLeft": 0.8, "browOuterUpRight": 0.8},
 }
 _LOOK = _Look(size=(480, 600), background=(72, 74, 84))
+PERFORMANCE = "performance.mp4"
+_FPS = 25
+_STAGE = "Rendering and exporting"
 
 
 def demo_photos() -> Path:
@@ -42,7 +49,7 @@ def demo_photos() -> Path:
 
 
 def run_demo(folder: Path, *, progress: Progress) -> Path:
-    """Head, pictures, `.glb` and a page that shows them. Returns the page.
+    """Head, pictures, `.glb`, a performance and a page that shows them. Returns the page.
 
     Raises: InputError: the folder holds something else or cannot be written.
     """
@@ -51,7 +58,11 @@ def run_demo(folder: Path, *, progress: Progress) -> Path:
         head = build_head_folder(demo_photos(), place / "head", progress=progress).head
         pictures = _save_pictures(head, place, progress)
         export_head(head, place / "james.glb")
-        progress("Rendering and exporting", 2, 2)
+        progress(_STAGE, 2, 2)
+        animate_head(
+            head, SAMPLE_TIMELINE, place / PERFORMANCE, fps=_FPS, **_LOOK, progress=progress
+        )
+        shutil.copy(SAMPLE_TIMELINE, place)
         page = _page(head, pictures)
         (place / "index.html").write_text(page, encoding="utf-8")
     return folder / "index.html"
@@ -59,10 +70,11 @@ def run_demo(folder: Path, *, progress: Progress) -> Path:
 
 def _save_pictures(head: Head, place: Path, progress: Progress) -> dict[str, list[dict[str, str]]]:
     """Pictures of the head, turned and with face units: captions and file names by section."""
-    progress("Rendering and exporting", 0, 2)
-    turned = {name: render_head(head, yaw=radians(yaw), **_LOOK) for name, yaw in YAWS.items()}
+    progress(_STAGE, 0, 2)
+    renderer = HeadRenderer(head)
+    turned = {name: render_head(renderer, yaw=radians(yaw), **_LOOK) for name, yaw in YAWS.items()}
     moved = {
-        name: render_head(head, yaw=radians(-20), units=units, **_LOOK)
+        name: render_head(renderer, yaw=radians(-20), state=FaceState(units=units), **_LOOK)
         for name, units in UNITS.items()
     }
     shown: dict[str, list[dict[str, str]]] = {}
@@ -72,7 +84,7 @@ def _save_pictures(head: Head, place: Path, progress: Progress) -> dict[str, lis
             file = f"pictures/{name.replace(' ', '_')}.jpg"
             save_image(place / file, picture, quality=90)
             shown[section].append({"file": file, "caption": name})
-    progress("Rendering and exporting", 1, 2)
+    progress(_STAGE, 1, 2)
     return shown
 
 
@@ -81,7 +93,10 @@ def _page(head: Head, pictures: dict[str, list[dict[str, str]]]) -> str:
 
     page = Environment(loader=PackageLoader("mien.app", "."), autoescape=True)
     return page.get_template("demo.html.j2").render(
-        photos=[view.photo for view in head.views], pictures=pictures, turntable=TURNTABLE
+        photos=[view.photo for view in head.views],
+        pictures=pictures,
+        turntable=TURNTABLE,
+        performance=PERFORMANCE,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ from mien.model.expression.fit import ExpressionFit
 from mien.model.fit import Fit
 from mien.model.head import Head
 from mien.model.verdict import Mark, PhotoFit
+from mien.report.expressions import count_expressions, expression_rows
 from mien.report.pictures import (
     UNCERTAINTY_LIMITS_MM,
     coverage_pictures,
@@ -45,13 +46,22 @@ class ReportInput:
     turntable: str = ""
 
 
-def render_report(data: ReportInput) -> str:
-    """The page's HTML."""
+def render_report(
+    data: ReportInput, *, progress: Callable[[int, int], None] = lambda done, total: None
+) -> str:
+    """The page's HTML.
+
+    Args:
+        progress: told the steps done and their total.
+    """
     from jinja2 import Environment, PackageLoader
 
+    total = count_expressions(data.head) + 1
+    progress(0, total)
+    expressions = expression_rows(data.head, data.photos, lambda done: progress(done, total))
     page = Environment(loader=PackageLoader("mien.report", "."), autoescape=True)
     left, right = eye_centers(data.head.mesh)
-    return page.get_template("report.html.j2").render(
+    text = page.get_template("report.html.j2").render(
         title=f"{data.head.subject}: report of the build",
         version=data.head.generator.removeprefix("mien "),
         vertices=f"{len(data.head.mesh.vertices):,}",
@@ -67,7 +77,10 @@ def render_report(data: ReportInput) -> str:
             for name, photo in fit.photos.items()
         ],
         turntable=data.turntable,
+        expressions=expressions,
     )
+    progress(total, total)
+    return text
 
 
 def _photo(

@@ -21,7 +21,7 @@ UNCERTAINTY_LIMITS_MM = (1.0, 10.0)
 """What the brightest and the darkest colour of the uncertainty stand for."""
 _DARK, _BRIGHT = np.array([60.0, 30.0, 80.0]), np.array([250.0, 220.0, 60.0])
 _SIZE = (360, 450)
-_BACKGROUND = (72, 74, 84)
+BACKGROUND = (72, 74, 84)
 _PHOTO_HEIGHT = 900
 _USED, _DISTRUSTED = (60, 230, 90), (240, 60, 50)
 
@@ -65,7 +65,7 @@ def overlay_picture(mesh: Mesh, fit: PhotoFit, pixels: UInt8[Array, "h w 3"]) ->
         ends = [tuple(int(x) for x in np.rint(point * 16)) for point in (seen, model)]
         cv2.line(image, ends[0], ends[1], colour, 1, cv2.LINE_AA, 4)
         cv2.circle(image, ends[0], 32 if mark.by_hand else 20, colour, -1, cv2.LINE_AA, 4)
-    return _data_uri(image)
+    return data_uri(image)
 
 
 def _seen_from(
@@ -84,11 +84,12 @@ def _seen_from(
         texture,
         vertex_colours=vertex_colours,
         samples=4,
-        background=_BACKGROUND,
+        background=BACKGROUND,
     )
-    return {"source": _data_uri(image[..., :3]), "caption": name}
+    return {"source": data_uri(image[..., :3]), "caption": name}
 
 
-def _data_uri(image: Array) -> str:
+def data_uri(image: UInt8[Array, "h w 3"]) -> str:
+    """The picture as the source of an <img>."""
     encoded = base64.b64encode(encode_image(image, "JPEG", quality=88)).decode()
     return f"data:image/jpeg;base64,{encoded}"

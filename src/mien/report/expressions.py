@@ -1,0 +1,130 @@
+"""What a report shows of a head's expressions: each beside its photo, and mixed by region."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from mien.arrays import Array, Bool, UInt8
+from mien.assets.generic import load_generic_head
+from mien.camera import Camera
+from mien.expressions.state import FACE, FaceState
+from mien.model.head import NEUTRAL, FittedView, Head
+from mien.render.picture import HeadRenderer
+from mien.render.shade import render
+from mien.report.pictures import BACKGROUND, data_uri
+
+MIXTURES = {
+    "half": {FACE: 0.5},
+    "in the mouth": {"mouth": 1.0},
+    "around the eyes": {"eyes": 1.0},
+    "in the forehead": {"forehead": 1.0},
+}
+"""Weights of an expression by region, by what the report calls them."""
+_MIXED_SIZE = (300, 375)
+_HEIGHT = 420
+_MARGIN = 0.04
+
+
+def count_expressions(head: Head) -> int:
+    """Expressions that a report shows; none for a head of neutral alone."""
+    return len(head.expressions) if len(head.expressions) > 1 else 0
+
+
+def expression_rows(
+    head: Head,
+    photos: Mapping[str, UInt8[Array, "h w 3"]],
+    progress: Callable[[int], None] = lambda done: None,
+) -> list[dict[str, Any]]:
+    """For each expression its photo, its picture from that camera, and mixtures with neutral.
+
+    Args:
+        photos: pixels by name. progress: told how many expressions are done.
+    """
+    if not count_expressions(head):
+        return []
+    renderer = HeadRenderer(head)
+    rows = []
+    for done, (name, expression) in enumerate(head.expressions.items(), 1):
+        view = max(expression.views, key=lambda item: _facing(item.camera), default=None)
+        if view is not None:
+            rows.append(_row(renderer, name, view, photos[view.photo]))
+        progress(done)
+    return rows
+
+
+def face_psnr(
+    renderer: HeadRenderer, name: str, view: FittedView, photo: UInt8[Array, "h w 3"]
+) -> tuple[float, UInt8[Array, "h w 4"]]:
+    """How near an expression, seen by its own camera, comes to its photo over the face, dB.
+
+    Colours are taken back to the photo's own exposure. Also gives the picture.
+    """
+    picture = renderer.draw(FaceState({FACE: {name: 1.0}}), view.camera)
+    colours = np.clip(np.rint(picture[..., :3] / view.gains), 0, 255).astype(np.uint8)
+    picture = np.concatenate([colours, picture[..., 3:]], axis=2)
+    inside = _face_pixels(renderer.head, name, view.camera)
+    squared = (colours[inside].astype(np.float64) - photo[inside]) ** 2
+    psnr = 10 * np.log10(255**2 / max(float(squared.mean()), 1e-2)) if inside.any() else 0.0
+    return psnr, picture
+
+
+def _row(
+    renderer: HeadRenderer, name: str, view: FittedView, photo: UInt8[Array, "h w 3"]
+) -> dict[str, Any]:
+    psnr, picture = face_psnr(renderer, name, view, photo)
+    alpha = picture[..., 3:] / 255
+    over_grey = np.rint(BACKGROUND + alpha * (picture[..., :3] - np.array(BACKGROUND)))
+    box = _box(picture[..., 3] > 0)
+    pictures = [(f"{name}: {view.photo}", photo[box]), ("mien", over_grey.astype(np.uint8)[box])]
+    return {
+        "name": name,
+        "psnr": psnr,
+        "pictures": [{"source": data_uri(_small(p)), "caption": text} for text, p in pictures],
+        "mixtures": [] if name == NEUTRAL else _mixtures(renderer, name),
+    }
+
+
+def _mixtures(renderer: HeadRenderer, name: str) -> list[dict[str, str]]:
+    camera = renderer.camera(size=_MIXED_SIZE)
+    pictures = []
+    for caption, regions in MIXTURES.items():
+        state = FaceState({region: {name: weight} for region, weight in regions.items()})
+        picture = renderer.draw(state, camera, background=BACKGROUND)
+        pictures.append({"source": data_uri(picture[..., :3]), "caption": f"{name}, {caption}"})
+    return pictures
+
+
+def _face_pixels(head: Head, name: str, camera: Camera) -> Bool[Array, "h w"]:
+    """Where the camera sees the face, not the rest of the head."""
+    grey = np.where(load_generic_head().regions["face"] > 0.5, 255.0, 0.0)
+    colours = np.repeat(grey[:, None], 3, axis=1)
+    seen = render(head.expression_mesh(name), camera, vertex_colours=colours)
+    inside: Array = (seen[..., 0] > 200) & (seen[..., 3] > 0)
+    return inside
+
+
+def _facing(camera: Camera) -> float:
+    """1 for a camera that the face looks at, less for one from the side."""
+    return float(-camera.R_cam_head[2, 2])
+
+
+def _box(mask: Bool[Array, "h w"]) -> tuple[slice, slice]:
+    """The part of a picture that holds the head, and a little more."""
+    sides = []
+    for axis, length in enumerate(mask.shape):
+        at = np.flatnonzero(mask.any(axis=1 - axis))
+        margin = round(_MARGIN * length)
+        low, high = (at[0], at[-1] + 1) if len(at) else (0, length)
+        sides.append(slice(max(0, low - margin), high + margin))
+    return sides[0], sides[1]
+
+
+def _small(picture: UInt8[Array, "h w 3"]) -> UInt8[Array, "h w 3"]:
+    import cv2
+
+    factor = min(1.0, _HEIGHT / len(picture))
+    small: Array = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+    return small
