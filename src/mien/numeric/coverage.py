@@ -133,8 +133,8 @@ def _is_front(planes: Array, t: int) -> bool:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def cover_strip(coverage: Coverage, strip: int, ids: Array, nearest: Array) -> None:
-    """Write each sample's triangle, -1 for none.
+def cover_strip(coverage: Coverage, strip: int, ids: Array, nearest: Array) -> tuple[int, int]:
+    """Write each sample's triangle, -1 for none; return the first column reached and the end.
 
     Args:
         ids: (STRIP, coverage.width) int32, from column coverage.left on.
@@ -145,13 +145,17 @@ def cover_strip(coverage: Coverage, strip: int, ids: Array, nearest: Array) -> N
     origin = strip * STRIP
     farthest = np.empty((STRIP // BLOCK, -(-coverage.width // BLOCK)), np.float32)
     backs = coverage.starts[2 * strip + 1]
+    first, last = coverage.width, -1
     for n in range(coverage.starts[2 * strip], coverage.starts[2 * strip + 2]):
         t = coverage.order[n]
+        first = min(first, coverage.boxes[t, 2] - coverage.left)
+        last = max(last, coverage.boxes[t, 3] - coverage.left)
         if n == backs:
             _keep_farthest(nearest, farthest)
         # Nearly all backs lie behind fronts: they are left out without looking at samples.
         if n < backs or not _is_hidden(coverage, t, origin, farthest):
             _cover(coverage, t, origin, ids, nearest)
+    return first, last + 1
 
 
 @njit(cache=True, nogil=True)

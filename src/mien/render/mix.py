@@ -153,23 +153,26 @@ def _draw_strips(
     places = np.empty((most, 7))
     colours = np.empty((coverage.width // factor, 4), np.float32)
     for strip in range(first, end):
-        cover_strip(coverage, strip, ids, nearest)
+        first_sample, end_sample = cover_strip(coverage, strip, ids, nearest)
+        columns = range(first_sample // factor, (end_sample + factor - 1) // factor)
         for line in range(0, STRIP, factor):
             row = (strip * STRIP + line) // factor
             if row == len(image):
                 break
-            count = _list_fragments(ids, line, factor, fragments)
+            count = _list_fragments(ids, line, columns, factor, fragments)
             _find_places(coverage, surface, fragments, strip, count, places)
             colours[:] = 0.0
             _add_colours(coverage.triangles, surface, pyramids, fragments, count, places, colours)
-            _write_row(colours, image, row, left)
+            _write_row(colours, columns, image[row], left)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _list_fragments(ids: Array, line: int, factor: int, fragments: Fragments) -> int:
+def _list_fragments(
+    ids: Array, line: int, columns: range, factor: int, fragments: Fragments
+) -> int:
     """Fill in the fragments of the pixels whose samples begin in this line; return their number."""
     middle, found = 0.5 * factor, 0
-    for col in range(ids.shape[1] // factor):
+    for col in columns:
         t = ids[line, col * factor]
         alike = True
         for a in range(line, line + factor):
@@ -271,10 +274,10 @@ def _add_colours(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _write_row(colours: Array, image: Array, row: int, left: int) -> None:
-    for col in range(len(colours)):
+def _write_row(colours: Array, columns: range, pixels: Array, left: int) -> None:
+    for col in columns:
         alpha = colours[col, 3]
         whole = 1.0 / max(alpha, np.float32(1e-3))
         for c in range(3):
-            image[row, left + col, c] = min(max(np.rint(colours[col, c] * whole), 0.0), 255.0)
-        image[row, left + col, 3] = np.rint(alpha * 255.0)
+            pixels[left + col, c] = min(max(np.rint(colours[col, c] * whole), 0.0), 255.0)
+        pixels[left + col, 3] = np.rint(alpha * 255.0)
