@@ -13,17 +13,16 @@ from mien.camera import Camera
 from mien.expressions.state import FACE, FaceState
 from mien.model.head import NEUTRAL, FittedView, Head
 from mien.render.picture import HeadRenderer
-from mien.render.shade import render
+from mien.render.shade import over_background, render
 from mien.report.pictures import BACKGROUND, data_uri
 
 MIXTURES = {
-    "half": {FACE: 0.5},
+    "half of it": {FACE: 0.5},
     "in the mouth": {"mouth": 1.0},
     "around the eyes": {"eyes": 1.0},
     "in the forehead": {"forehead": 1.0},
 }
 """Weights of an expression by region, by what the report calls them."""
-_MIXED_SIZE = (300, 375)
 _HEIGHT = 420
 _MARGIN = 0.04
 
@@ -75,25 +74,28 @@ def _row(
     renderer: HeadRenderer, name: str, view: FittedView, photo: UInt8[Array, "h w 3"]
 ) -> dict[str, Any]:
     psnr, picture = face_psnr(renderer, name, view, photo)
-    alpha = picture[..., 3:] / 255
-    over_grey = np.rint(BACKGROUND + alpha * (picture[..., :3] - np.array(BACKGROUND)))
     box = _box(picture[..., 3] > 0)
-    pictures = [(f"{name}: {view.photo}", photo[box]), ("mien", over_grey.astype(np.uint8)[box])]
+    factor = min(1.0, _HEIGHT / (box[0].stop - box[0].start))
+    shown = {view.photo: photo, "mien": over_background(picture, BACKGROUND)[..., :3]}
+    pictures = {caption: _small(image[box], factor) for caption, image in shown.items()}
+    if name != NEUTRAL:
+        camera = view.camera.resized(factor)
+        mixed = _mixtures(renderer, name, camera).items()
+        pictures |= {caption: image[_scaled(box, factor)] for caption, image in mixed}
     return {
         "name": name,
         "psnr": psnr,
-        "pictures": [{"source": data_uri(_small(p)), "caption": text} for text, p in pictures],
-        "mixtures": [] if name == NEUTRAL else _mixtures(renderer, name),
+        "pictures": [{"caption": c, "source": data_uri(image)} for c, image in pictures.items()],
     }
 
 
-def _mixtures(renderer: HeadRenderer, name: str) -> list[dict[str, str]]:
-    camera = renderer.camera(size=_MIXED_SIZE)
-    pictures = []
+def _mixtures(
+    renderer: HeadRenderer, name: str, camera: Camera
+) -> dict[str, UInt8[Array, "h w 3"]]:
+    pictures = {}
     for caption, regions in MIXTURES.items():
         state = FaceState({region: {name: weight} for region, weight in regions.items()})
-        picture = renderer.draw(state, camera, background=BACKGROUND)
-        pictures.append({"source": data_uri(picture[..., :3]), "caption": f"{name}, {caption}"})
+        pictures[caption] = renderer.draw(state, camera, background=BACKGROUND)[..., :3]
     return pictures
 
 
@@ -118,13 +120,17 @@ def _box(mask: Bool[Array, "h w"]) -> tuple[slice, slice]:
         at = np.flatnonzero(mask.any(axis=1 - axis))
         margin = round(_MARGIN * length)
         low, high = (at[0], at[-1] + 1) if len(at) else (0, length)
-        sides.append(slice(max(0, low - margin), high + margin))
+        sides.append(slice(max(0, low - margin), min(length, high + margin)))
     return sides[0], sides[1]
 
 
-def _small(picture: UInt8[Array, "h w 3"]) -> UInt8[Array, "h w 3"]:
+def _scaled(box: tuple[slice, slice], factor: float) -> tuple[slice, slice]:
+    rows, columns = (slice(round(side.start * factor), round(side.stop * factor)) for side in box)
+    return rows, columns
+
+
+def _small(picture: UInt8[Array, "h w 3"], factor: float) -> UInt8[Array, "h w 3"]:
     import cv2
 
-    factor = min(1.0, _HEIGHT / len(picture))
     small: Array = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
     return small
