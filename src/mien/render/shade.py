@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
-from mien.arrays import Array, Float, UInt8, check_array
+from mien.arrays import Array, Float, UInt8, check_array, frozen
 from mien.camera import Camera
 from mien.errors import InputError
 from mien.mesh import Mesh
 from mien.numeric.raster import Raster, interpolate, rasterize
+from mien.numeric.threads import for_row_bands
 from mien.render.mipmap import build_pyramids
 from mien.render.mix import draw_mix, painted
 from mien.render.projection import enlarged, project_safely, samples_across
@@ -114,14 +116,26 @@ def over_background(
     image: UInt8[Array, "h w 4"], background: tuple[int, int, int] | UInt8[Array, "h w 3"]
 ) -> UInt8[Array, "h w 4"]:
     """The image over a colour or another image, opaque. Raises: InputError: sizes that differ."""
-    below = np.asarray(background, np.float32)
+    below = np.asarray(background)
     if below.shape not in ((3,), (*image.shape[:2], 3)):
         expected = f"a colour or an image of {image.shape[1]}x{image.shape[0]} px"
         raise InputError("background", expected, f"shape {below.shape}")
-    alpha = image[..., 3:].astype(np.float32) / 255
-    mixed = np.rint(below + alpha * (image[..., :3] - below)).astype(np.uint8)
-    opaque = np.full((*image.shape[:2], 1), 255, np.uint8)
-    return np.concatenate([mixed, opaque], axis=2)
+    height, width = image.shape[:2]
+    below = frozen(np.broadcast_to(below, (height, width, 3)))
+    above, mixed = frozen(np.ascontiguousarray(image)), np.empty((height, width, 4), np.uint8)
+    for_row_bands(lambda a, b: _mix_rows(above, below, a, b, mixed), height, work=width * height)
+    return mixed
+
+
+@njit(cache=True, nogil=True)
+def _mix_rows(above: Array, below: Array, first: int, end: int, mixed: Array) -> None:
+    for row in range(first, end):
+        for col in range(above.shape[1]):
+            alpha = np.float32(above[row, col, 3]) / np.float32(255)
+            for c in range(3):
+                back = np.float32(below[row, col, c])
+                mixed[row, col, c] = np.rint(back + alpha * (above[row, col, c] - back))
+            mixed[row, col, 3] = 255
 
 
 def _brightness(normals: Float[Array, "*n 3"], light: Light) -> Float[Array, "*n"]:
