@@ -16,6 +16,7 @@ from mien.capture.source import View
 from mien.model.expression.known import KnownHead
 from mien.model.features import Features, gather_features
 from mien.model.sightings import Sightings
+from mien.numeric.rotation import rotation_from_vector
 from people import person
 
 NEUTRAL = person(3)
@@ -37,6 +38,17 @@ def making(weights: Array) -> Array:
     """(V, 3) mm: the person making a face of these units."""
     moved: Array = NEUTRAL + np.tensordot(weights, GENERIC.unit_offsets, axes=1)
     return moved
+
+
+def looking(vertices: Array, yaw: float, pitch: float) -> Array:
+    """(V, 3) mm: the head with both eyeballs turned by so many degrees about their centres."""
+    about_x, about_y = rotation_from_vector(np.radians([[-pitch, 0, 0], [0, yaw, 0]]))
+    result = vertices.copy()
+    for name in ("left_eyeball", "right_eyeball"):
+        ball = np.unique(GENERIC.mesh.triangles[GENERIC.mesh.triangles_of(name)])
+        centre = vertices[ball].mean(axis=0)
+        result[ball] = centre + (vertices[ball] - centre) @ (about_y @ about_x).T
+    return result
 
 
 def bump(middle: Array, *, width_mm: float, along: Sequence[float]) -> Array:
