@@ -6,12 +6,15 @@ import pytest
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
 from mien.errors import InputError
+from mien.expressions.state import FACE, FaceState, Gaze
 from mien.model.head import Expression, FittedView, Head
-from mien.render.picture import render_head, turntable_frames, with_units
+from mien.render.morph import MorphRenderer
+from mien.render.picture import HeadRenderer, render_head, turntable_frames
 from people import camera
 
 GENERIC = load_generic_head()
 MESH = GENERIC.mesh
+AWED = MESH.vertices + 0.5 * GENERIC.unit_offsets[GENERIC.unit_names.index("jawOpen")]
 
 
 @pytest.fixture(scope="module")
@@ -20,12 +23,16 @@ def head() -> Head:
         subject="nobody",
         mesh=MESH,
         expressions={
-            "neutral": Expression(MESH.vertices, (FittedView("side.png", camera(30), 1.0, 13),))
+            "neutral": Expression(MESH.vertices, (FittedView("side.png", camera(30), 1.0, 13),)),
+            "awe": Expression(AWED, (FittedView("awe/a.png", camera(0), 1.0, 13),), "awe"),
         },
         uncertainty_mm=np.ones(len(MESH.vertices)),
         unit_names=GENERIC.unit_names,
         unit_offsets=GENERIC.unit_offsets,
-        textures={"atlas": np.full((16, 16, 3), (200, 100, 50), np.uint8)},
+        textures={
+            "atlas": np.full((16, 16, 3), (200, 100, 50), np.uint8),
+            "awe": np.full((16, 16, 3), (60, 120, 180), np.uint8),
+        },
     )
 
 
@@ -34,11 +41,11 @@ def used(monkeypatch: pytest.MonkeyPatch) -> list[Camera]:
     """The cameras that pictures were rendered with; the pictures are empty."""
     cameras: list[Camera] = []
 
-    def remember(mesh: object, camera: Camera, *arguments: object, **options: object) -> object:
+    def remember(self: object, face: object, camera: Camera, **options: object) -> object:
         cameras.append(camera)
         return np.zeros((camera.height, camera.width, 4), np.uint8)
 
-    monkeypatch.setattr("mien.render.picture.render", remember)
+    monkeypatch.setattr(MorphRenderer, "render", remember)
     return cameras
 
 
@@ -113,34 +120,71 @@ def test_colours_and_alpha(head: Head) -> None:
     np.testing.assert_array_equal(painted[50, 40], picture[50, 40])
 
 
-def test_units_are_added(head: Head) -> None:
-    jaw, smile = (head.unit_names.index(name) for name in ("jawOpen", "mouthSmileLeft"))
-    moved = with_units(head, {"jawOpen": 0.5, "mouthSmileLeft": -2.0})
-    expected = MESH.vertices + 0.5 * head.units[jaw] - 2 * head.units[smile]
-    np.testing.assert_allclose(moved, expected, atol=1e-9)
-    np.testing.assert_array_equal(with_units(head, {}), MESH.vertices)
+def test_a_state_is_what_the_rig_makes_of_it(head: Head) -> None:
+    renderer = HeadRenderer(head)
+    state = FaceState(
+        {FACE: {"awe": 0.25}, "mouth": {"awe": -0.5}}, {"jawOpen": 0.5}, Gaze(0.3, 0.1)
+    )
+    size = (160, 200)
+    face = renderer.rig.evaluate(state)
+    drawn = MorphRenderer(head.mesh, renderer.rig.textures).render(
+        face, renderer.camera(0.2, size=size)
+    )
+    for given in (head, renderer):
+        picture = render_head(given, yaw=0.2, size=size, state=state)
+        np.testing.assert_array_equal(picture, drawn)
+    resting = render_head(renderer, yaw=0.2, size=size)
+    assert (resting != drawn).any()
 
 
-def test_an_open_jaw_lowers_the_chin(head: Head) -> None:
-    chin = GENERIC.vertex_of("chin")
-    moved = with_units(head, {"jawOpen": 0.5})
-    assert moved[chin, 1] < MESH.vertices[chin, 1] - 5
-    brow = GENERIC.vertex_of("left_eyebrow_upper.2")
-    np.testing.assert_allclose(moved[brow], MESH.vertices[brow], atol=0.5)
+def test_one_expression_shows_its_own_texture(head: Head) -> None:
+    whole = render_head(head, size=(80, 100), state=FaceState({FACE: {"awe": 1.0}}))
+    half = render_head(head, size=(80, 100), state=FaceState({FACE: {"awe": 0.5}}))
+    assert whole[40, 40].tolist() == [60, 120, 180, 255]
+    assert half[40, 40].tolist() == [130, 110, 115, 255]
+
+
+def test_a_photo_shows_the_expression_that_it_belongs_to(head: Head) -> None:
+    awe = FaceState({FACE: {"awe": 1.0}})
+    shown = render_head(head, photo="awe/a.png")
+    np.testing.assert_array_equal(shown, render_head(head, photo="awe/a.png", state=awe))
+    neutral = FaceState({FACE: {"neutral": 1.0}})
+    other = render_head(head, photo="awe/a.png", state=neutral)
+    assert (other[..., :3] != shown[..., :3]).any()
+    resting = render_head(head, photo="side.png")
+    np.testing.assert_array_equal(resting, render_head(head, photo="side.png", state=neutral))
+
+
+def test_units_come_on_top_of_a_photos_expression(head: Head) -> None:
+    blink = {"eyeBlinkLeft": 1.0}
+    shown = render_head(head, photo="awe/a.png", state=FaceState(units=blink))
+    told = FaceState({FACE: {"awe": 1.0}}, blink)
+    np.testing.assert_array_equal(shown, render_head(head, photo="awe/a.png", state=told))
 
 
 def test_units_do_not_change_the_framing(head: Head, used: list[Camera]) -> None:
     render_head(head)
-    render_head(head, units={"jawOpen": 1.0})
+    render_head(head, state=FaceState(units={"jawOpen": 1.0}))
     np.testing.assert_array_equal(used[0].t_cam_head, used[1].t_cam_head)
 
 
-def test_unknown_names(head: Head) -> None:
-    with pytest.raises(InputError, match="unit: expected a face unit such as jawOpen, got jawopen"):
-        render_head(head, units={"jawopen": 1.0})
-    with pytest.raises(InputError, match="unit: expected a face unit, got zzz"):
-        render_head(head, units={"zzz": 1.0})
-    with pytest.raises(InputError, match=r"the head's photos \(side\.png\), got front\.png"):
+@pytest.mark.parametrize(
+    ("state", "message"),
+    [
+        (FaceState(units={"jawopen": 1}), "unit: expected one of the head's, such as jawOpen"),
+        (FaceState({FACE: {"aw": 1}}), "expression: expected one of the head's, such as awe"),
+        (FaceState({"mouht": {"awe": 1}}), "region: expected one of the head's, such as mouth"),
+        (FaceState({FACE: {"awe": 1.6}}), "weight of awe: expected -0.5 to 1.5, got 1.6"),
+        (FaceState({FACE: {"awe": -0.6}}), "weight of awe: expected -0.5 to 1.5, got -0.6"),
+    ],
+)
+def test_what_a_head_cannot_do(head: Head, state: FaceState, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        render_head(head, state=state)
+
+
+def test_an_unknown_photo(head: Head) -> None:
+    with pytest.raises(InputError, match=r"photos \(side\.png, awe/a\.png\), got front\.png"):
         render_head(head, photo="front.png")
 
 
