@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import os
 import subprocess
@@ -30,11 +31,13 @@ class Drawn:
 
     Attributes:
         fps: over all frames. best_fps: of the fastest tenth, when nothing else ran.
+        cpu_ms: of all threads, a frame.
         peak_mb: of resident memory. growth_mb: from the first frames to the last.
     """
 
     fps: float
     best_fps: float
+    cpu_ms: float
     frames: int
     peak_mb: float
     growth_mb: float
@@ -72,13 +75,15 @@ def difference(ours: Path, theirs: Path) -> tuple[float, float, float]:
 
 HEADER = (
     "",
-    "mien, frames/s",
-    "OpenGL, frames/s",
+    "frames/s: mien",
+    "OpenGL",
     "mien / OpenGL",
-    "mien, fastest tenth",
-    "OpenGL, fastest tenth",
-    "mien, peak MiB",
-    "OpenGL, peak MiB",
+    "fastest tenth: mien",
+    "OpenGL",
+    "CPU ms a frame: mien",
+    "OpenGL",
+    "peak MiB: mien",
+    "OpenGL",
     "pictures differ: mean",
     "99.9 %",
     "greatest",
@@ -94,13 +99,13 @@ def compare(work: Path, textures: Sequence[int]) -> str:
             mien = draw("render_mien", size, count, ours)
             name = f"{size[0]}x{size[1]}, {count} textures"
             if not render_gl.is_installed():
-                rest = (mien.best_fps, "-", mien.peak_mb, "-", "-", "-", "-")
-                rows.append([name, mien.fps, "-", "-", *rest])
+                pairs = ((mien.fps, "-", "-"), (mien.best_fps, "-"), (mien.cpu_ms, "-"))
+                rows.append([name, *itertools.chain(*pairs), mien.peak_mb, *"----"])
                 continue
             peer = draw("render_gl", size, count, theirs)
             figures = (mien.fps, peer.fps, mien.fps / peer.fps, mien.best_fps, peer.best_fps)
-            memory = (mien.peak_mb, peer.peak_mb)
-            rows.append([name, *figures, *memory, *difference(ours, theirs)])
+            costs = (mien.cpu_ms, peer.cpu_ms, mien.peak_mb, peer.peak_mb)
+            rows.append([name, *figures, *costs, *difference(ours, theirs)])
     return markdown_table(HEADER, rows)
 
 
@@ -130,7 +135,7 @@ INTRO = (
     "straight alpha, read as a numpy array. OpenGL: one pass a texture on {gl}, added up in half "
     "floats, driven by moderngl. Each in a process of its own on {cores} cores. Load average "
     "before the start {before}, at the end {after}: with other work on the cores, the fastest "
-    "tenth of the frames tells more than the mean. Differences in grey levels, where both "
+    "tenth of the frames and the CPU time of all threads tell more than the mean. Differences in grey levels, where both "
     "pictures are opaque; the greatest are where triangles meet, as the two have their four "
     "samples at other places in a pixel. The benchmark's own scene takes part of the memory."
 )

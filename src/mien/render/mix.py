@@ -53,7 +53,7 @@ class Surface(NamedTuple):
     mixes: Int[Array, " f"]
 
 
-def painted(mesh: Mesh, pyramids: Pyramids) -> Painted:
+def prepare_painted(mesh: Mesh, pyramids: Pyramids) -> Painted:
     """The mesh's triangles. Raises: InputError: a mesh without texture coordinates."""
     if len(mesh.uv_triangles) == 0:
         raise InputError("mesh", "one with texture coordinates", "one without")

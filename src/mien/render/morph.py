@@ -10,7 +10,7 @@ from mien.errors import InputError
 from mien.expressions.state import PosedFace
 from mien.mesh import Mesh
 from mien.render.mipmap import build_pyramids
-from mien.render.mix import draw_mix, painted
+from mien.render.mix import draw_mix, prepare_painted
 from mien.render.projection import samples_across
 from mien.render.shade import over_background, shown_parts
 
@@ -34,7 +34,7 @@ class MorphRenderer:
         parts: tuple[str, ...] | None = None,
     ) -> None:
         shown = mesh.submesh(mesh.triangles_of(*(shown_parts(mesh) if parts is None else parts)))
-        self._painted = painted(shown, build_pyramids(textures))
+        self._painted = prepare_painted(shown, build_pyramids(textures))
         self._shape = (len(mesh.vertices), len(textures))
 
     def render(

@@ -14,7 +14,7 @@ from mien.mesh import Mesh
 from mien.numeric.raster import Raster, interpolate, rasterize
 from mien.numeric.threads import for_row_bands
 from mien.render.mipmap import build_pyramids
-from mien.render.mix import draw_mix, painted
+from mien.render.mix import draw_mix, prepare_painted
 from mien.render.projection import enlarged, project_safely, samples_across
 
 
@@ -79,7 +79,7 @@ def _textured(
     brightness = np.ones(count)
     if light is not None:
         brightness = _brightness(mesh.vertex_normals() @ camera.R_cam_head.T, light)
-    surface = painted(mesh, build_pyramids([texture]))
+    surface = prepare_painted(mesh, build_pyramids([texture]))
     return draw_mix(surface, mesh.vertices, np.ones((count, 1)), brightness, camera, factor)
 
 
