@@ -201,7 +201,7 @@ def _shaded_parts(generic: GenericHead) -> tuple[Array, Array, Array]:
 
 def _one_expression(by_region: Float[Array, "r k"]) -> bool:
     """Whether the face is one photographed expression, everywhere the same."""
-    return bool((by_region == by_region[0]).all() and (by_region.max() == 1))
+    return bool((by_region == by_region[0]).all() and np.count_nonzero(by_region[0]) == 1)
 
 
 def _check_known(what: str, name: str, known: Iterable[str]) -> None:
