@@ -13,6 +13,7 @@ from mien.assets.generic import GenericHead, load_generic_head
 from mien.capture.annotations import save_annotations
 from mien.capture.source import Capture, load_capture
 from mien.errors import EstimationError
+from mien.expressions.closing import meet_lips
 from mien.expressions.contacts import Contacts, fit_units
 from mien.expressions.gaze import with_turned_eyes
 from mien.expressions.looks import Photographed, paint_expressions
@@ -36,6 +37,7 @@ Progress = Callable[[str, int, int], None]
 """Told the stage, the steps done and their total."""
 
 SOLVING = "Solving cameras and shape"
+REPORTING = "Writing the report"
 TURNTABLE = "turntable.mp4"
 _NEGLIGIBLE = 0.01
 """A unit with less weight has no part in an expression."""
@@ -133,6 +135,7 @@ def _fit_all(
 
     tell(SOLVING, 0, count)
     neutral = fit_views(capture.expressions[NEUTRAL], generic, options.fit, progress=part(0))
+    neutral = replace(neutral, vertices=meet_lips(generic, neutral.vertices))
     fits: dict[str, Fit | ExpressionFit] = {NEUTRAL: neutral}
     views = [view for view in capture.expressions[NEUTRAL] if view.photo.name in neutral.photos]
     cameras = [neutral.photos[view.photo.name].camera for view in views]
@@ -277,7 +280,7 @@ def build_head_folder(
     result = build_head(source, options=options, progress=progress)
     stage = "Writing the head"
     with atomic_folder(folder, replaces=is_head_folder) as place:
-        tell(stage, 0, 3)
+        tell(stage, 0, 2)
         photos = _photos(result.capture)
         used = [(view.photo, photos[view.photo]) for view in result.head.views]
         write_head(result.head, place, photos=used)
@@ -285,12 +288,12 @@ def build_head_folder(
             if view.annotations:
                 file = (place / "annotations" / view.photo.name).with_suffix(".json")
                 save_annotations(file, view.photo, view.annotations)
-        tell(stage, 1, 3)
+        tell(stage, 1, 2)
         write_video(place / TURNTABLE, turntable_frames(result.head), fps=24)
-        tell(stage, 2, 3)
+        tell(stage, 2, 2)
         report = ReportInput(
             result.head, photos, result.fits, result.coverage, result.notes, TURNTABLE
         )
-        (place / "report.html").write_text(render_report(report), encoding="utf-8")
-        tell(stage, 3, 3)
+        page = render_report(report, progress=lambda done, total: tell(REPORTING, done, total))
+        (place / "report.html").write_text(page, encoding="utf-8")
     return result

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
-from mien.arrays import Array, Bool, Float, UInt8
+from mien.arrays import Array, Bool, Float, Int, UInt8
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
+from mien.expressions.regions import default_masks
 from mien.expressions.shading import (
     EYES,
     TEETH,
@@ -27,7 +29,8 @@ from mien.model.head import NEUTRAL
 from mien.texture.atlas import atlas_surface
 from mien.texture.expression import ExpressionLook, look_at_expression
 from mien.texture.parts import SKIN
-from mien.texture.surface import SurfaceMap, parts_of
+from mien.texture.surface import SurfaceMap, over_vertices, parts_of
+from mien.texture.teeth import usual_teeth
 
 _GROUPS: Mapping[str, tuple[int, str]] = {
     "left_eyeball": (0, EYES),
@@ -38,6 +41,8 @@ _GROUPS: Mapping[str, tuple[int, str]] = {
 }
 """The parts in the shadow of lids and lips: which opening and which polynomial is theirs."""
 _MOUTH = 2
+_AROUND_MM = (4.0, 10.0)
+"""What belongs to an eye or a mouth: all within the first distance, nothing beyond the second."""
 _SEEN = 0.9
 _TINTS = (0.4, 1.2)
 _ENOUGH = 60
@@ -93,7 +98,7 @@ def paint_expressions(
     opened = {name: openings.measure(item.vertices) for name, item in photographed.items()}
     shading = _fit_shading(surface, mesh, looks, opened)
     light = {name: brightness_at(at, shading) for name, at in opened.items()}
-    common = _common_parts(surface, mesh, looks, light, base)
+    common = _common_parts(surface, mesh, looks, light, base, generic)
     textures = {}
     for name, look in looks.items():
         below = base.astype(np.float32)
@@ -108,35 +113,63 @@ def _look(
     mesh: Mesh, item: Photographed, name: str, base: UInt8[Array, "h w 3"], generic: GenericHead
 ) -> ExpressionLook:
     height, width = base.shape[:2]
-    regions = generic.regions
-    several = name == NEUTRAL and len(item.cameras) > 1
-    # The photos of a neutral face from several sides are blended already; one alone shows what
-    # lies between lids and lips.
-    within = _around_slits(generic) if several else regions["face"]
-    chosen = [_most_frontal(item.cameras)] if several else range(len(item.cameras))
-    return look_at_expression(
-        mesh,
-        [item.cameras[k] for k in chosen],
-        [item.photos[k] for k in chosen],
-        surface=atlas_surface(mesh, width=width, height=height),
-        below=base,
-        within=within,
-        inside=np.maximum(regions["mouth_cavity"], regions["eye_socket"]),
-    )
+    surface = atlas_surface(mesh, width=width, height=height)
+    inside = np.maximum(generic.regions["mouth_cavity"], generic.regions["eye_socket"])
+
+    def seen_by(views: Sequence[int], within: Float[Array, " v"]) -> ExpressionLook:
+        return look_at_expression(
+            mesh,
+            [item.cameras[k] for k in views],
+            [item.photos[k] for k in views],
+            surface=surface,
+            below=base,
+            within=within,
+            inside=inside,
+        )
+
+    if name != NEUTRAL or len(item.cameras) == 1:
+        return seen_by(
+            range(len(item.cameras)), np.sum(list(default_masks(generic).values()), axis=0)
+        )
+    # The photos of a neutral face from several sides are blended already. What lies between and
+    # around lids and lips comes from one photo for each (P02 sec. 5.2.4): two would not agree.
+    looks = [
+        seen_by([_best_view(mesh, lines, item.cameras)], mask)
+        for lines, mask in _slits(mesh, generic)
+    ]
+    return reduce(ExpressionLook.beside, looks)
 
 
-def _around_slits(generic: GenericHead) -> Float[Array, " v"]:
-    """(V,) lips and what is inside the mouth and the eyes' sockets."""
-    regions = generic.regions
-    around: Array = np.maximum(
-        regions["lips"], np.maximum(regions["mouth_cavity"], regions["eye_socket"])
-    )
-    return around
+def _slits(mesh: Mesh, generic: GenericHead) -> list[tuple[Int[Array, " n"], Float[Array, " v"]]]:
+    """Vertices along each eye's lids and along the lips, and (V,) masks of their surroundings."""
+    from scipy.spatial import cKDTree
+
+    slits = []
+    masks = default_masks(generic)
+    whole = {"mouth": masks["left_mouth"] + masks["right_mouth"]}
+    for region in ("left_eye", "right_eye", "mouth"):
+        side = region.removesuffix("_eye")
+        names = ("upper_lip_inner", "lower_lip_inner")
+        if region != "mouth":
+            names = (f"{side}_upper_eyelid", f"{side}_lower_eyelid")
+        lines = np.array([vertex for name in names for vertex in generic.polylines[name]])
+        distance = cKDTree(mesh.vertices[lines]).query(mesh.vertices)[0]
+        near = np.clip((_AROUND_MM[1] - distance) / (_AROUND_MM[1] - _AROUND_MM[0]), 0, 1)
+        slits.append((lines, near * whole.get(region, masks.get(region, near))))
+    return slits
 
 
-def _most_frontal(cameras: Sequence[Camera]) -> int:
-    facing = [camera.center[2] / np.linalg.norm(camera.center) for camera in cameras]
-    return int(np.argmax(facing))
+def _best_view(mesh: Mesh, around: Int[Array, " n"], cameras: Sequence[Camera]) -> int:
+    """The photo that shows the vertices largest and most squarely."""
+    places, normals = mesh.vertices[around], mesh.vertex_normals()[around]
+
+    def quality(camera: Camera) -> float:
+        towards = camera.center - places
+        distance = np.linalg.norm(towards, axis=1)
+        facing = np.einsum("vc,vc->v", towards, normals) / distance
+        return float(np.mean(np.maximum(facing, 0) * camera.focal_px / distance))
+
+    return int(np.argmax([quality(camera) for camera in cameras]))
 
 
 def _fit_shading(
@@ -161,7 +194,8 @@ def _fit_shading(
 def _tint(surface: SurfaceMap, mesh: Mesh, base: UInt8[Array, "h w 3"]) -> Float[Array, " 3"]:
     """(3,) by how much the person's skin is darker or warmer than skin usually is in photos."""
     skin = base[parts_of(surface, mesh, "skin")]
-    return np.clip(np.median(skin, axis=0) / np.array(SKIN.default), *_TINTS)
+    tint: Array = np.clip(np.median(skin, axis=0) / np.array(SKIN.default), *_TINTS)
+    return tint
 
 
 def _by_seen(looks: Mapping[str, ExpressionLook], texels: Bool[Array, "h w"]) -> list[str]:
@@ -182,15 +216,19 @@ def _common_parts(
     looks: Mapping[str, ExpressionLook],
     light: Mapping[str, Float[Array, " 3"]],
     base: UInt8[Array, "h w 3"],
+    generic: GenericHead,
 ) -> Float[Array, "h w 3"]:
     """(H, W, 3) eyes and teeth in full light: from the expression that shows most of each, then
-    from the next, and what none shows from neutral's texture, which for teeth and tongue is a
-    colour for usual light: it takes on the light that is on the skin."""
+    from the next. What none shows has neutral's colours, or usual ones, which take on the light
+    that is on the skin."""
     common = base.astype(np.float32)
     tint = _tint(surface, mesh, base)
     for part, (column, _) in _GROUPS.items():
         texels = parts_of(surface, mesh, part)
         colours = common[texels] / light[NEUTRAL][column]
+        if part.endswith("teeth"):
+            points = over_vertices(surface, mesh, generic.mesh.vertices)
+            colours = usual_teeth(points[texels], part)
         if column == _MOUTH:
             colours *= tint
         for name in _by_seen(looks, texels):

@@ -15,7 +15,7 @@ from mien.mesh import Mesh
 NEUTRAL = "neutral"
 ATLAS = "atlas"
 CYLINDER = "cylinder"
-SHADING = {"eyes": (0.62, 0.52, -0.14), "teeth": (0.35, 3.2, -3.9)}
+SHADING = {"eyes": (0.62, 0.52, -0.14), "teeth": (0.45, 3.0, -4.0)}
 """Brightness of eyes and teeth as photographs usually have it: c0 + c1 o + c2 o^2, o being the gap
 between the lids over neutral's, or that between the lips over the mouth's width."""
 

@@ -55,6 +55,17 @@ class ExpressionLook:
         # Beyond the charts: where nothing is seen, the gutters below are as good.
         return fill_gutters(pixels, surface.mask)
 
+    def beside(self, other: ExpressionLook) -> ExpressionLook:
+        """Both, where their shares lie beside each other; where they overlap, in between."""
+        total = np.maximum(self.share + other.share, 1e-6)[..., None]
+        mixed = self.share[..., None] * self.colours + other.share[..., None] * other.colours
+        return ExpressionLook(
+            (mixed / total).astype(np.float32),
+            np.minimum(self.share + other.share, 1),
+            np.maximum(self.seen * (self.share > 0), other.seen * (other.share > 0)),
+            np.concatenate([self.gains, other.gains]),
+        )
+
 
 def look_at_expression(
     mesh: Mesh,
@@ -71,8 +82,8 @@ def look_at_expression(
     Args:
         mesh: as fitted to the photos. surface: its atlas_surface, (H, W).
         below: (H, W, 3) neutral's texture: exposures are matched to it.
-        within: (V,) in [0, 1], where skin may differ from neutral's: P02's facial mask (sec.
-            6.1.1); hair and neck are neutral's for all expressions.
+        within: (V,) in [0, 1], where the head may look different from neutral, eyes and teeth
+            included: P02's facial mask (sec. 6.1.1); hair and neck are the same for all.
         inside: (V,) in [0, 1], skin behind lips and lids.
     """
     solid = mesh.submesh(
@@ -104,7 +115,7 @@ def look_at_expression(
         colours[texels], share[texels] = _spread(blend, texels, reach_mm / surface.texel_mm)
     outer = skin & ~inner
     share[outer] *= _ramp(seen, outer, surface)[outer]
-    share[skin] *= mask[skin]
+    share *= mask
     known = np.where(outer, seen.confidence, narrow.confidence)
     return ExpressionLook(colours, share.astype(np.float32), known, gains)
 

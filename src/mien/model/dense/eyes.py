@@ -13,26 +13,29 @@ _OPENING_MM = 1.0
 """Skin that touches it so closely is the lid's edge or inside."""
 _TRUST_MM = 6.0
 """How far the eyeball moves from where the skin around it has carried it."""
+_RADIUS_SD_MM = 2.0
+"""How far an eyeball's radius is off the generic head's: eyes differ by less, but so do scales."""
 _ROUNDS = 10
 _EYEBALLS = ("left_eyeball", "right_eyeball")
 
 
 def seat_eyes(vertices: Float[Array, "v 3"], generic: GenericHead) -> Float[Array, "v 3"]:
-    """The head with its eyeballs where the lids leave room for them.
+    """The head with round eyeballs that fill the room between the lids.
 
     Lids are tracked badly (lashes, moisture, shadows), so that a ball which goes with the skin
-    around it can come out through a lid. Each ball is moved to where the lids lie as far off it as
-    they do on the generic head; a lid that is still inside is lifted out.
+    around it can come out through a lid, or leave a gap beside it. Each ball takes the place and
+    the size at which the lids lie as far off it as they do on the generic head; a lid that is still
+    inside is lifted out.
     """
     result = vertices.copy()
     for name in _EYEBALLS:
         ball = np.unique(generic.mesh.triangles[generic.mesh.triangles_of(name)])
         lids, gap = _lids(ball, generic)
-        centre = vertices[ball].mean(axis=0)
-        radius = float(np.linalg.norm(vertices[ball] - centre, axis=1).max())
-        seat = _seat(vertices[lids], gap, centre, radius)
-        result[ball] = vertices[ball] + seat - centre
-        result[lids] = _lifted(vertices[lids], gap, seat, radius)
+        shape = generic.mesh.vertices[ball] - generic.mesh.vertices[ball].mean(axis=0)
+        usual = float(np.linalg.norm(shape, axis=1).max())
+        centre, radius = _seat(vertices[lids], gap, vertices[ball].mean(axis=0), usual)
+        result[ball] = centre + radius / usual * shape
+        result[lids] = _lifted(vertices[lids], gap, centre, radius)
     return result
 
 
@@ -53,19 +56,26 @@ def _lids(
 
 def _seat(
     lids: Float[Array, "l 3"], gap: Float[Array, " l"], centre: Float[Array, " 3"], radius: float
-) -> Float[Array, " 3"]:
-    """The centre from which the lids lie radius + gap away, near where it was (Gauss-Newton)."""
-    seat = centre
+) -> tuple[Float[Array, " 3"], float]:
+    """Centre and radius at which the lids lie radius + gap off, near what is given (Gauss-Newton).
+
+    Args:
+        centre: where the skin around the ball has carried it. radius: mm, a usual one.
+    """
+    usual = np.append(centre, radius)
+    prior = len(lids) / np.append(np.full(3, _TRUST_MM), _RADIUS_SD_MM) ** 2
+    seat = usual
     for _ in range(_ROUNDS):
-        away = lids - seat
+        away = lids - seat[:3]
         length = np.linalg.norm(away, axis=1)
-        off = length - radius - gap
+        off = length - seat[3] - gap
         # One lid out of place must not push the ball.
         weights = 1 / (1 + off**2)
-        normal = (weights[:, None] * away).T @ (away / length[:, None] ** 2)
-        gradient = (weights * off / length) @ away - (seat - centre) * len(lids) / _TRUST_MM**2
-        seat = seat + np.linalg.solve(normal + np.eye(3) * len(lids) / _TRUST_MM**2, gradient)
-    return seat
+        jacobian = np.column_stack([-away / length[:, None], -np.ones(len(lids))])
+        weighted = weights[:, None] * jacobian
+        gradient = weighted.T @ off + prior * (seat - usual)
+        seat = seat - np.linalg.solve(weighted.T @ jacobian + np.diag(prior), gradient)
+    return seat[:3], float(seat[3])
 
 
 def _lifted(
