@@ -6,6 +6,7 @@ import contextlib
 import io
 import shutil
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,8 @@ from mien.app.cli import main
 from mien.app.demo import demo_photos
 from mien.arrays import Array
 from mien.build import Build, build_head
+from mien.formats.head_folder import save_head
+from mien.model.head import ATLAS, Expression
 from mien.texture.cylinder import cylinder_surface
 from mien.texture.extract import Texture
 from mien.texture.surface import SurfaceMap
@@ -62,6 +65,24 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
     return Built(source, place / "head", results[0], summary)
 
 
+@pytest.fixture(scope="session")
+def expressive(built: Built, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A head folder: James with two faces more, made of units, greenish and reddish."""
+    head = built.result.head
+    faces = {"joy": ("mouthSmileLeft", "mouthSmileRight"), "anger": ("browDownLeft",)}
+    expressions, textures = dict(head.expressions), dict(head.textures)
+    for channel, (name, units) in enumerate(faces.items()):
+        offsets = sum(head.units[head.unit_names.index(unit)] for unit in units)
+        views = tuple(replace(view, photo=f"{name}/{view.photo}") for view in head.views[:1])
+        weights = dict.fromkeys(units, 1.0)
+        expressions[name] = Expression(head.mesh.vertices + offsets, views, name, weights)
+        textures[name] = head.textures[ATLAS] // 2
+        textures[name][..., channel] = head.textures[ATLAS][..., channel]
+    folder = tmp_path_factory.mktemp("expressive") / "head"
+    save_head(replace(head, expressions=expressions, textures=textures), folder)
+    return folder
+
+
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Builds whose turntable and cylinder, the slowest stages, are small."""
@@ -80,7 +101,7 @@ def untextured(monkeypatch: pytest.MonkeyPatch, quick: None) -> None:
         return Texture(np.full((*shape, 3), 128, np.uint8), np.ones(shape), np.ones((1, 3)))
 
     monkeypatch.setattr("mien.build.extract_texture", grey)
-    monkeypatch.setattr("mien.build.render_report", lambda data: "")
+    monkeypatch.setattr("mien.build.render_report", lambda data, **options: "")
 
 
 @pytest.fixture

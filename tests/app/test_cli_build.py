@@ -15,6 +15,7 @@ import pytest
 from PIL import Image
 
 from mien.errors import InputError
+from mien.expressions.regions import MASKS
 from mien.formats.head_folder import load_head
 from terminal import FAST, SHORT_TURNTABLE, Built, Mien
 
@@ -34,6 +35,7 @@ def test_the_head_folder_is_what_the_design_says(built: Built) -> None:
         "photos/right.png",
         "annotations/left.json",
         "annotations/right.json",
+        *(f"regions/{name}.png" for name in MASKS),
     }
 
 

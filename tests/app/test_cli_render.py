@@ -59,7 +59,7 @@ def test_a_photos_camera_gives_back_the_photo(
 def test_size_and_alpha(built: Built, mien: Mien, tmp_path: Path) -> None:
     out = tmp_path / "a.png"
     ran = mien("render", built.folder, "-o", out, "--size", "120x150", "--json")
-    assert ran.json == {"output": str(out)}
+    assert ran.json == {"output": str(out), "notes": []}
     picture = pixels(out)
     assert picture.shape == (150, 120, 4)
     assert (picture[0, :, 3] == 0).all()
@@ -119,11 +119,108 @@ def test_a_unit_moves_its_part_of_the_face_alone(built: Built, mien: Mien, tmp_p
     assert len(rows) > 20
 
 
+SMALL = ("--size", "120x150")
+
+
+def rendered(mien: Mien, head: Path, out: Path, *options: object) -> Array:
+    assert mien("render", head, "-o", out, *options).status == 0
+    return pixels(out).astype(int)
+
+
+def test_an_expression_shows_its_texture(expressive: Path, mien: Mien, tmp_path: Path) -> None:
+    """Halfway between the two: each pixel's colour is mixed, where the shape hardly moves."""
+    place = (50, 60, slice(3))
+    pictures = [
+        rendered(mien, expressive, tmp_path / f"{w}.png", *SMALL, "--expression", f"joy={w}")
+        for w in (0, 0.5, 1)
+    ]
+    rest, half, joy = (picture[place] for picture in pictures)
+    np.testing.assert_allclose(half, (rest + joy) / 2, atol=2)
+    assert joy[0] > 1.5 * joy[1:].max()
+
+
+def test_a_region_alone_changes(expressive: Path, mien: Mien, tmp_path: Path) -> None:
+    rest = rendered(mien, expressive, tmp_path / "a.png", *SMALL)
+    mouth = rendered(mien, expressive, tmp_path / "b.png", *SMALL, "--region", "mouth:joy=1")
+    rows = np.flatnonzero((rest != mouth).any(axis=(1, 2)))
+    head = np.flatnonzero(rest[..., 3].any(axis=1))
+    assert len(rows) > 10
+    assert rows.min() > head[len(head) // 3], "below the eyes"
+
+
+def test_the_eyes_look_to_their_own_left(built: Built, mien: Mien, tmp_path: Path) -> None:
+    """The dark of an iris moves to the picture's right."""
+    where = []
+    for yaw in (-20, 20):
+        size = ("--size", "600x750")
+        shown = rendered(mien, built.folder, tmp_path / "a.png", *size, "--gaze", f"{yaw},0")
+        where.append(shown[..., :3].sum(axis=2))
+    changed = np.abs(where[0] - where[1]) > 60
+    assert changed.sum() > 20
+    columns = np.broadcast_to(np.arange(600), changed.shape)
+    to_right, to_left = (
+        columns[changed & mask] for mask in (where[1] < where[0], where[1] > where[0])
+    )
+    middle = 300
+    for side in (lambda x: x < middle, lambda x: x >= middle):
+        assert to_right[side(to_right)].mean() > to_left[side(to_left)].mean()
+
+
+def test_a_photo_of_an_expression_shows_it(expressive: Path, mien: Mien, tmp_path: Path) -> None:
+    camera = ("--camera", "joy/left.png")
+    shown = rendered(mien, expressive, tmp_path / "a.png", *camera)
+    told = rendered(mien, expressive, tmp_path / "b.png", *camera, "--expression", "joy=1")
+    np.testing.assert_array_equal(shown, told)
+    other = rendered(mien, expressive, tmp_path / "c.png", *camera, "--expression", "neutral=1")
+    assert (other != shown).any()
+
+
+def test_past_what_was_photographed_is_noted(expressive: Path, mien: Mien, tmp_path: Path) -> None:
+    out = tmp_path / "a.png"
+    options = ("-o", out, *SMALL, "--expression", "joy=1.25", "--region", "mouth:anger=0.5")
+    note = "face: past what was photographed (weights outside 0 to 1): neutral -0.25, joy 1.25"
+    ran = mien("render", expressive, *options)
+    assert (ran.status, ran.out, ran.err) == (0, f"{out}\n", f"note: {note}\n")
+    assert mien("render", expressive, *options, "--json").json["notes"] == [note]
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--unit", "jawOpn=0.5"], "unit: expected a face unit such as jawOpen, "),
-        (["--unit", "qqqq=0.5"], "unit: expected a face unit, got qqqq"),
+        (["--expression", "joy=1.6"], "weight of joy: expected -0.5 to 1.5, got 1.6"),
+        (["--region", "eyes:joy=-0.51"], "weight of joy: expected -0.5 to 1.5, got -0.51"),
+        (
+            ["--expression", "joy=0.9", "--expression", "anger=0.9"],
+            "weight of neutral: expected -0.5 to 1.5, got -0.8",
+        ),
+        (
+            ["--expression", "joi=1"],
+            "expression: expected one of the head's, such as joy, got joi",
+        ),
+        (
+            ["--expression", "joy=0.5", "--expression", "neutral=0.6"],
+            "weights: expected weights that sum to 1, got the sum 1.1",
+        ),
+    ],
+)
+def test_weights_that_no_face_may_have(
+    options: list[str], message: str, expressive: Path, mien: Mien, tmp_path: Path
+) -> None:
+    error = mien("render", expressive, "-o", tmp_path / "a.png", *options).error
+    assert error == message
+    assert not (tmp_path / "a.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--unit", "jawOpn=0.5"], "unit: expected one of the head's, such as jawOpen, "),
+        (["--unit", "qqqq=0.5"], "unit: expected one of the head's, such as browDownLeft, "),
+        (["--expression", "joy=0.5"], "expression: expected one of the head's, such as neutral, "),
+        (["--expression", "joy"], "--expression: expected NAME=AMOUNT, as joy=0.6, got joy"),
+        (["--region", "mouht:joy=1"], "region: expected one of the head's, such as mouth"),
+        (["--region", "mouth=1"], "--region: expected REGION:NAME=AMOUNT, as mouth:anger=0.4"),
+        (["--gaze", "10"], "--gaze: expected YAW,PITCH in degrees, as 10,-5, got 10"),
         (["--unit", "jawOpen"], "--unit: expected NAME=AMOUNT, as jawOpen=0.5, got jawOpen"),
         (
             ["--unit", "jawOpen=wide"],

@@ -2,8 +2,18 @@ from __future__ import annotations
 
 import pytest
 
-from mien.app.options import check_finite, parse_amounts, parse_colour, parse_size
+from mien.app.options import (
+    check_finite,
+    parse_amounts,
+    parse_angles,
+    parse_colour,
+    parse_count,
+    parse_regions,
+    parse_size,
+    parse_state,
+)
 from mien.errors import InputError
+from mien.expressions.state import FaceState, Gaze
 
 
 def test_sizes() -> None:
@@ -44,3 +54,45 @@ def test_finite_numbers() -> None:
     assert check_finite("--yaw", -5.0) == -5.0
     with pytest.raises(InputError, match="--yaw: expected a finite number, got inf"):
         check_finite("--yaw", float("inf"))
+
+
+def test_amounts_by_region() -> None:
+    texts = ["mouth:anger=0.4", "left_eye:joy=1", "mouth:joy=-0.1"]
+    expected = {"mouth": {"anger": 0.4, "joy": -0.1}, "left_eye": {"joy": 1.0}}
+    assert parse_regions("--region", texts) == expected
+
+
+@pytest.mark.parametrize("text", ["", "mouth=1", ":joy=1", "mouth:=1", "mouth:joy", "mouth:joy=x"])
+def test_what_is_no_amount_in_a_region(text: str) -> None:
+    with pytest.raises(InputError, match="--region: expected REGION:NAME=AMOUNT, as mouth:anger"):
+        parse_regions("--region", [text])
+
+
+def test_angles_come_in_radians() -> None:
+    assert parse_angles("--gaze", "180,-90") == pytest.approx((3.14159265, -1.57079633))
+
+
+@pytest.mark.parametrize("text", ["", "1", "1,2,3", "a,b", "1;2"])
+def test_what_are_no_angles(text: str) -> None:
+    with pytest.raises(InputError, match="--gaze: expected YAW,PITCH in degrees, as 10,-5"):
+        parse_angles("--gaze", text)
+    with pytest.raises(InputError, match="--gaze: expected a finite number, got nan"):
+        parse_angles("--gaze", "nan,0")
+
+
+def test_a_state_of_all_options() -> None:
+    state = parse_state(["joy=0.6"], ["mouth:anger=0.4"], ["jawOpen=0.5"], "0,0")
+    assert state == FaceState(
+        {"mouth": {"anger": 0.4}, "face": {"joy": 0.6}}, {"jawOpen": 0.5}, Gaze()
+    )
+    assert parse_state(None, None, None, None) == FaceState()
+
+
+def test_counts() -> None:
+    assert [parse_count("-n", text) for text in (None, "none", "5")] == [None, 0, 5]
+
+
+@pytest.mark.parametrize("text", ["", "0", "-1", "1.5", "many", "²"])
+def test_what_is_no_count(text: str) -> None:
+    with pytest.raises(InputError, match="--expressions: expected a number from 1 up, or none"):
+        parse_count("--expressions", text)
