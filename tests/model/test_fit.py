@@ -12,12 +12,15 @@ import numpy as np
 import pytest
 
 from mien.assets.generic import load_generic_head
+from mien.assets.landmark_sets import EYES, LIPS
 from mien.camera import Camera
 from mien.capture.annotations import Annotations
 from mien.capture.source import View
 from mien.errors import EstimationError
+from mien.model import fit as fitting
 from mien.model.deform import eye_centers
-from mien.model.fit import Fit, FitOptions, fit_views
+from mien.model.fit import ONE_SIDE, Fit, FitOptions, fit_views
+from mien.model.registration import NOTHING_SHARED
 from mien.numeric.similarity import estimate_similarity
 from people import (
     PX_PER_MM,
@@ -216,6 +219,49 @@ def test_one_viewpoint_says_so(adjust: bool) -> None:
     assert re.match("all photos come from within [12] degrees: depth comes from the prior", note)
     assert np.isfinite(fit.vertices).all()
     assert off_mm(fit.vertices).max() < 15, "the prior's head, not a flattened one"
+
+
+def test_of_photos_from_one_side_the_one_that_tells_most_gives_the_shape() -> None:
+    """The others would only blur what it shows."""
+    fewer = MARKS[:-10]
+    views = [
+        photographed(PERSON, camera(yaw), name=name, points=points)
+        for yaw, name, points in ((0, "a", fewer), (2, "b", MARKS), (4, "c", fewer))
+    ]
+    options = replace(QUICK, dense=True)
+    fit = fit_views(views, GENERIC, options)
+    assert list(fit.photos) == ["b"]
+    assert fit.left_out == dict.fromkeys(("a", "c"), ONE_SIDE.format("b"))
+    alone = fit_views(views[1:2], GENERIC, options)
+    np.testing.assert_array_equal(fit.vertices, alone.vertices)
+    assert fit.notes == alone.notes
+
+
+@pytest.mark.parametrize("further", [camera(14), camera(2, distance=1100)])
+def test_another_side_or_another_distance_tells_depth(further: Camera) -> None:
+    """Black photos share nothing to be registered by, and are kept."""
+    views = views_of([camera(0), further], points=MARKS)
+    fit = fit_views(views, GENERIC, replace(QUICK, dense=True))
+    assert list(fit.photos) == ["0.png", "1.png"]
+    assert NOTHING_SHARED in fit.notes
+
+
+def test_lids_and_lips_lie_where_landmarks_show_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    views = views_of(FIVE[2:3], points=(), landmarks=True)
+    guided = fit_views(views, GENERIC, QUICK)
+    monkeypatch.setattr(fitting, "guide_features", lambda vertices, *others, **options: vertices)
+    plain = fit_views(views, GENERIC, QUICK)
+    off = [
+        np.median(
+            [
+                mark.distance_px
+                for mark in item.photos["0.png"].marks
+                if int(mark.name.split()[1]) in EYES | LIPS
+            ]
+        )
+        for item in (guided, plain)
+    ]
+    assert off[0] < 0.7 * off[1]
 
 
 def test_the_frames_of_a_video_share_their_lens() -> None:

@@ -6,15 +6,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from expressive import NEUTRAL, exactly_detected, neutral_photo
 from marbled import GENERIC, Person, at, clutter, photographed
 from mien.capture.annotations import Annotations
 from mien.capture.photos import Photo
 from mien.capture.source import View
 from mien.errors import EstimationError
 from mien.model import registration
-from mien.model.features import gather_features
+from mien.model.dense.quality import REGIONS, Quality
+from mien.model.dense.register import Registration
+from mien.model.features import EDGE_SIGMA_MM, gather_features
 from mien.model.landmark_fit import Solution, residuals_of
-from mien.model.registration import NOT_PLACED, NOTHING_SHARED, register_solution
+from mien.model.registration import (
+    CONTRADICTED,
+    MOST_MISFIT,
+    NOT_PLACED,
+    NOTHING_SHARED,
+    register_solution,
+)
 from mien.numeric.rotation import angle_between
 from people import person
 
@@ -85,6 +94,53 @@ def test_a_failure_is_told_and_loses_nothing(
     (note,) = found.notes
     assert "could not be registered with each other (not determined)" in note
     assert found.cameras == start.cameras
+
+
+def registered_beside(start: Solution, mm: float) -> Registration:
+    """The true head with true cameras, all of it so much to its left."""
+    nothing = np.zeros(len(start.views))
+    quality = Quality(
+        shared=np.full(len(nothing), 1000),
+        disagreeing=np.full((len(nothing), len(REGIONS)), np.nan),
+        turn_sd=nothing,
+        rms_px=nothing,
+    )
+    vertices = start.vertices + np.array([mm, 0, 0])
+    return Registration(start.cameras, vertices, np.full(len(vertices), 0.3), quality)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.8, 1.02])
+def test_a_head_that_the_landmarks_contradict_is_refused(
+    monkeypatch: pytest.MonkeyPatch, share: float
+) -> None:
+    """So many of what landmarks on edges may be off: photos without parallax follow their noise."""
+    cameras = [at(yaw) for yaw in (-2.0, 0.0, 2.0)]
+    views = tuple(exactly_detected(neutral_photo(), item, NEUTRAL) for item in cameras)
+    features = gather_features(views, GENERIC)
+    residuals = residuals_of(features, cameras, NEUTRAL)
+    start = Solution(views, features, tuple(cameras), NEUTRAL, residuals, np.ones(len(NEUTRAL)), {})
+    found = registered_beside(start, share * MOST_MISFIT * EDGE_SIGMA_MM)
+    monkeypatch.setattr(registration, "register_views", lambda *known, **options: found)
+    result = register_solution(start, [], GENERIC)
+    if share > 1:
+        assert result.notes == (CONTRADICTED,)
+        assert result.matches == ()
+        np.testing.assert_array_equal(result.vertices, start.vertices)
+        assert (result.uncertainty_mm > found.deviation_mm).all()
+    else:
+        assert result.notes == ()
+        assert [count for count, _ in result.matches] == [1000] * 3
+        np.testing.assert_array_equal(result.vertices, found.vertices)
+        np.testing.assert_array_equal(result.uncertainty_mm, found.deviation_mm)
+
+
+def test_marks_by_hand_alone_contradict_nothing(
+    start: Solution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They have been part of the registration."""
+    found = registered_beside(start, 30.0)
+    monkeypatch.setattr(registration, "register_views", lambda *known, **options: found)
+    assert register_solution(start, [], GENERIC).notes == ()
 
 
 def test_a_photo_that_turns_too_far_is_named(start: Solution) -> None:

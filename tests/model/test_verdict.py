@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from mien.model.verdict import Mark, PhotoFit, find_misfit, name_notes, typical_misfits
-from people import camera
+from mien.assets.generic import load_generic_head
+from mien.model.features import gather_features
+from mien.model.verdict import (
+    Mark,
+    PhotoFit,
+    depth_notes,
+    find_misfit,
+    judge_marks,
+    name_notes,
+    typical_misfits,
+    view_spread,
+)
+from people import camera, person, photographed
 
 
 def photo_fit(distrusted: int, of: int, *, by_hand: bool = True) -> PhotoFit:
@@ -53,3 +66,51 @@ def test_the_worst_photo_is_left_out_only_when_it_stands_apart(
 ) -> None:
     found = find_misfit(np.array(typical))
     assert (found and found[0]) == worst
+
+
+def test_why_a_photo_is_left_out() -> None:
+    _, why = find_misfit(np.array([1.0, 12.34, 2.0])) or (None, "")
+    assert why.startswith("its marks lie 12.3 times their expected error off the head that the oth")
+    assert why.endswith("(1.5 times there)")
+
+
+@pytest.mark.parametrize(("yaws", "degrees"), [((0, 0), 0), ((-30, 20), 50), ((0, 10, 4), 10)])
+def test_the_spread_of_views_is_that_of_the_two_farthest(
+    yaws: tuple[float, ...], degrees: float
+) -> None:
+    """As the head's origin sees the cameras, which look at a place 30 mm below."""
+    assert view_spread([camera(yaw) for yaw in yaws]) == pytest.approx(degrees, abs=0.3)
+    assert view_spread([camera(0, 10), camera(0, -15)]) == pytest.approx(25, abs=1.5)
+
+
+def test_what_views_say_of_depth() -> None:
+    assert depth_notes([camera(-5), camera(5)]) == ()
+    (alone,) = depth_notes([camera(20)])
+    assert alone.startswith("one photo: depth comes from the prior of faces")
+    (near,) = depth_notes([camera(-3), camera(3)])
+    assert near.startswith("all photos come from within 6 degrees: depth comes from the prior")
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "verdict"), [(4.9, ""), (7.4, "7 times its expected error off")]
+)
+def test_a_mark_far_off_its_expected_error_gets_a_verdict(sigmas: float, verdict: str) -> None:
+    view = photographed(person(0), camera(0), points=["chin", "nose_tip"])
+    features = gather_features([view], load_generic_head())
+    residuals, sigma_px = np.zeros((len(features.names), 2)), np.full(len(features.names), 2.0)
+    residuals[1] = [0.6 * 2 * sigmas, -0.8 * 2 * sigmas]
+    first, second = judge_marks(features, 0, residuals, sigma_px)
+    assert (first.verdict, second.verdict) == ("", verdict)
+    assert second.distance_px == pytest.approx(2 * sigmas)
+    assert second.by_hand
+    np.testing.assert_array_equal(second.image_point, features.image_points[0, 1])
+    assert {first.name, second.name} == {"chin", "nose_tip"}
+
+
+def test_matches_outweigh_landmarks_but_not_marks_by_hand() -> None:
+    detected, marked = (photo_fit(0, 10, by_hand=by_hand) for by_hand in (False, True))
+    assert (replace(detected, matches=90, matches_rms_px=1.0).points_used) == 90
+    assert replace(detected, matches=90, matches_rms_px=1.0).rms_px == pytest.approx(1.0)
+    both = replace(marked, matches=90, matches_rms_px=1.0)
+    assert both.points_used == 100
+    assert both.rms_px == pytest.approx(np.sqrt((90 * 1 + 10 * 25) / 100))
