@@ -135,9 +135,10 @@ INTRO = (
     "straight alpha, read as a numpy array. OpenGL: one pass a texture on {gl}, added up in half "
     "floats, driven by moderngl. Each in a process of its own on {cores} cores. Load average "
     "before the start {before}, at the end {after}: with other work on the cores, the fastest "
-    "tenth of the frames and the CPU time of all threads tell more than the mean. Differences in grey levels, where both "
-    "pictures are opaque; the greatest are where triangles meet, as the two have their four "
-    "samples at other places in a pixel. The benchmark's own scene takes part of the memory."
+    "tenth of the frames and the CPU time of all threads tell more than the mean. Differences in "
+    "grey levels, where both pictures are opaque; the greatest are where triangles meet, as the "
+    "two have their four samples at other places in a pixel. The benchmark's own scene takes part "
+    "of the memory."
 )
 
 

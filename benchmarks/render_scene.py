@@ -60,7 +60,7 @@ def build_scene(width: int, height: int, textures: int, *, texels: int = 2048) -
 
 
 def _shares(turn: float, textures: int) -> Array:
-    """(3, K) for mouth, eyes and forehead, summing to 1, from -0.2 to 1.2."""
+    """(3, K) for mouth, eyes and forehead, summing to 1, some of them below 0 at times."""
     phases = turn + np.arange(3)[:, None] * 2 + np.arange(textures) * 2 * np.pi / textures
     moving: Array = (1 + 1.2 * np.sin(phases)) / textures
     moving += (1 - moving.sum(axis=1, keepdims=True)) / textures
