@@ -47,3 +47,19 @@ def test_grazing_views_are_not_trusted_by_themselves() -> None:
     np.testing.assert_allclose(
         blend.confidence[between], (certainty[between] - 0.17) / 0.17, atol=1e-5
     )
+
+
+@pytest.mark.parametrize("fade", [(0.2, 0.5), (0.3, 0.6)])
+def test_colours_fade_out_between_the_two_cosines(fade: tuple[float, float]) -> None:
+    mesh = ellipsoid()
+    surface = atlas_surface(mesh, width=80, height=60)
+    photo = np.full((320, 320, 3), 99, np.uint8)
+    view = prepare_view(mesh, camera_at(0, mesh), photo, outline_mm=0)
+    blend = blend_views(surface, [view], feather_mm=0.1, fade=fade)
+    seen = sight(surface, view, feather_mm=0.1, least_certainty=fade[0])
+    whole = seen.feathered > 0.99
+    expected = np.clip((seen.certainty - fade[0]) / (fade[1] - fade[0]), 0, 1)
+    np.testing.assert_allclose(blend.confidence[whole], expected[whole], atol=1e-5)
+    assert not blend.confidence[seen.certainty < fade[0]].any()
+    assert (blend.confidence[whole] == 1).any()
+    assert ((blend.confidence > 0) & (blend.confidence < 1)).any()

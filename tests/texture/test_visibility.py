@@ -48,6 +48,18 @@ def test_certainty_is_the_cosine_towards_the_camera() -> None:
     np.testing.assert_allclose(seen.feathered[seen.certainty > 0.6], 1, atol=1e-6)
 
 
+@pytest.mark.parametrize("least", [0.17, 0.4, 0.7])
+def test_what_is_turned_away_further_than_asked_for_is_invisible(least: float) -> None:
+    mesh = ellipsoid()
+    surface = atlas_surface(mesh, width=100, height=80)
+    view = prepare_view(mesh, camera_at(0, mesh), GREY)
+    seen = sight(surface, view, feather_mm=0, least_certainty=least)
+    assert not seen.feathered[seen.certainty < least].any()
+    # Steeper, neighbouring pixels lie too far apart to be one layer's.
+    facing = seen.certainty > max(least, 0.4)
+    np.testing.assert_array_equal(seen.feathered[facing], 1)
+
+
 def test_points_outside_the_photo_are_invisible_and_its_border_is_feathered() -> None:
     mesh = ellipsoid()
     camera = camera_at(0, mesh)
