@@ -94,8 +94,8 @@ def _set_up(
         za, zb, zc = depth[i], depth[j], depth[k]
         boxes[t, 0], boxes[t, 1] = 0, -1
         drawable = za > 0.0 and zb > 0.0 and zc > 0.0 and za + zb + zc < np.inf
-        # The comparisons also refuse NaN.
-        if not (drawable and (area < 0.0 or area > 0.0)):
+        # The comparisons also refuse NaN, and what would make infinite planes.
+        if not (drawable and 1e-30 < abs(area) < np.inf):
             continue
         top = max(np.ceil(min(ay, by, cy) - 0.5), 0.0)
         bottom = min(np.floor(max(ay, by, cy) - 0.5), height - 1.0)
@@ -220,8 +220,8 @@ def _cover(coverage: Coverage, t: int, origin: int, ids: Array, nearest: Array) 
 def barycentrics_at(planes: Array, t: int, x: float, y: float) -> tuple[float, float, float]:
     """Perspective-correct, never negative, summing to 1: a place past an edge comes to the edge."""
     dx, dy = x - planes[t, X], y - planes[t, Y]
-    second = max(planes[t, X1] * dx + planes[t, Y1] * dy, 0.0)
-    third = max(planes[t, X2] * dx + planes[t, Y2] * dy, 0.0)
+    second = min(max(planes[t, X1] * dx + planes[t, Y1] * dy, 0.0), 1.0)
+    third = min(max(planes[t, X2] * dx + planes[t, Y2] * dy, 0.0), 1.0)
     p0 = max(1.0 - second - third, 0.0) * planes[t, W0]
     p1, p2 = second * planes[t, W1], third * planes[t, W2]
     inverse = 1.0 / (p0 + p1 + p2)
