@@ -13,6 +13,7 @@ from mien.assets.generic import load_generic_head
 from mien.build import Build, BuildOptions, build_head
 from mien.capture.source import Capture, View
 from mien.errors import EstimationError
+from mien.expressions.looks import paint_expressions
 from mien.model.fit import FitOptions
 from mien.model.registration import NOTHING_SHARED
 from mien.texture.extract import Texture
@@ -42,10 +43,18 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     ) -> Texture:
         seen.photos.append((len(cameras), [photo[0, 0, 0] for photo in photos], options["fill"]))
         shape = surface.mask.shape
-        return Texture(np.zeros((*shape, 3), np.uint8), np.ones(shape), np.ones((2, 3)))
+        return Texture(np.zeros((*shape, 3), np.uint8), np.ones(shape), np.ones((len(cameras), 3)))
 
     monkeypatch.setattr("mien.build.load_capture", load)
+
+    def paint(mesh: object, photographed: dict, *others: object) -> object:
+        seen.photographed = {
+            name: [photo[0, 0, 0] for photo in item.photos] for name, item in photographed.items()
+        }
+        return paint_expressions(mesh, photographed, *others)
+
     monkeypatch.setattr("mien.build.extract_texture", grey)
+    monkeypatch.setattr("mien.build.paint_expressions", paint)
     return seen
 
 
@@ -74,10 +83,11 @@ def test_a_head_of_one_expression(calls: SimpleNamespace) -> None:
 
 def test_options_reach_those_they_concern(calls: SimpleNamespace) -> None:
     calls.capture = Capture("Ann", {"neutral": (view("a.png", 0),)})
-    build_head("photos", options=replace(OPTIONS, face=2, frames=3, fill="grow"))
+    build_head("photos", options=replace(OPTIONS, face=2, frames=3, expressions=4, fill="grow"))
     assert calls.source == "photos"
     assert calls.options["face"] == 2
     assert calls.options["frames"] == 3
+    assert calls.options["expressions"] == 4
     assert {fill for _, _, fill in calls.photos} == {"grow"}
 
 
@@ -92,7 +102,8 @@ def test_expressions_have_shapes_and_textures_of_their_own(calls: SimpleNamespac
     result = build_head("photos", options=OPTIONS)
     assert [item.photo for item in result.head.views] == ["neutral/a.png", "joy/a.png"]
     assert set(result.head.textures) == {"atlas", "joy", "cylinder"}
-    assert [photos for _, photos, _ in calls.photos] == [[10], [20], [10]]
+    assert [photos for _, photos, _ in calls.photos] == [[10], [10]], "atlas and cylinder"
+    assert calls.photographed == {"neutral": [10], "joy": [20]}
     shapes = [item.vertices for item in result.head.expressions.values()]
     assert np.abs(shapes[0] - shapes[1]).max() > 1
     assert not np.array_equal(result.head.mesh.vertices, shapes[1])
@@ -106,6 +117,16 @@ def test_a_photo_that_does_not_fit_is_named_in_the_notes(calls: SimpleNamespace)
     assert result.head.left_out == {"wrong.png": "shows 3 points, needs 6"}
     assert result.notes == ("wrong.png was left out: shows 3 points, needs 6", NOTHING_SHARED)
     assert {count for count, _, _ in calls.photos} == {2}
+
+
+def test_an_expression_that_does_not_fit_is_named_in_the_notes(calls: SimpleNamespace) -> None:
+    shown = {"neutral": (view("a.png", 0),), "joy": (view("b.png", 0, points=MARKS[:3]),)}
+    calls.capture = Capture("Ann", shown)
+    result = build_head("photos", options=OPTIONS)
+    assert set(result.head.expressions) == {"neutral"}
+    assert [item.photo for item in result.head.views] == ["neutral/a.png"]
+    (note,) = [note for note in result.notes if "joy" in note]
+    assert note.startswith("joy: left out: ")
 
 
 def test_without_neutral(calls: SimpleNamespace) -> None:

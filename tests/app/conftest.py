@@ -96,9 +96,11 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 def untextured(monkeypatch: pytest.MonkeyPatch, quick: None) -> None:
     """Builds of grey heads without a report, where it is the photos and cameras that count."""
 
-    def grey(*arguments: object, surface: SurfaceMap, **options: object) -> Texture:
-        shape = surface.triangle_ids.shape
-        return Texture(np.full((*shape, 3), 128, np.uint8), np.ones(shape), np.ones((1, 3)))
+    def grey(
+        mesh: object, cameras: list, *others: object, surface: SurfaceMap, **_: object
+    ) -> Texture:
+        shape, gains = surface.triangle_ids.shape, np.ones((len(cameras), 3))
+        return Texture(np.full((*shape, 3), 128, np.uint8), np.ones(shape), gains)
 
     monkeypatch.setattr("mien.build.extract_texture", grey)
     monkeypatch.setattr("mien.build.render_report", lambda data, **options: "")

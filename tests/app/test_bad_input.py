@@ -130,7 +130,9 @@ def test_all_photos_from_one_viewpoint(bare_james: Path, mien: Mien, tmp_path: P
     left = pixels(bare_james / "left.png")
     save(bare_james / "again.png", np.roll(left, (9, -7), axis=(0, 1)))
     summary = mien("build", bare_james, "-o", tmp_path / "head", *SMALL).json
-    assert any(note.startswith("all photos come from within ") for note in summary["notes"])
+    assert any("look from nearly one side" in note for note in summary["notes"])
+    assert list(summary["left_out"]) == ["again.png"]
+    assert "one photo: depth comes from the prior" in summary["notes"][-1]
 
 
 @pytest.mark.parametrize(
