@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from PIL import Image
 from mien.errors import FileFormatError, InputError
 from mien.formats.head_folder import check_head_place, load_head, save_head
 from mien.formats.head_json import VERSION
-from mien.model.head import Head
+from mien.model.head import SHADING, Head
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -52,6 +53,51 @@ def test_what_is_saved_comes_back(small_head: Head, saved: Path) -> None:
     for name, expression in small_head.expressions.items():
         np.testing.assert_array_equal(loaded.expressions[name].vertices, expression.vertices)
         assert loaded.expressions[name].texture == expression.texture
+
+
+def expressive(head: Head) -> Head:
+    """The head with all that an expression can have."""
+    joy = replace(
+        head.expressions["joy"],
+        units={"jawOpen": 0.25, "tongueOut": -0.125},
+        gaze=np.array([[0.1, -0.2], [1 / 3, 0]]),
+        views=tuple(replace(v, gains=np.array([1.1, 0.9, 1 / 3])) for v in head.views[:1]),
+    )
+    shading = {"eyes": (0.1, 1 / 3, -2.0), "teeth": (1.0, 0.0, 0.5)}
+    return replace(head, expressions={**head.expressions, "joy": joy}, shading=shading)
+
+
+def test_what_expressions_are_made_of_comes_back(small_head: Head, tmp_path: Path) -> None:
+    head = expressive(small_head)
+    save_head(head, tmp_path / "h")
+    loaded = load_head(tmp_path / "h")
+    assert loaded.shading == head.shading
+    for name, expression in head.expressions.items():
+        found = loaded.expressions[name]
+        assert found.units == expression.units
+        np.testing.assert_array_equal(found.gaze, expression.gaze)
+        for view, kept in zip(expression.views, found.views, strict=True):
+            np.testing.assert_array_equal(kept.gains, view.gains)
+
+
+def test_a_head_of_an_older_mien_loads(small_head: Head, tmp_path: Path) -> None:
+    save_head(expressive(small_head), tmp_path / "h")
+
+    def age(data: dict[str, Any]) -> None:
+        del data["shading"]
+        for expression in data["expressions"].values():
+            del expression["units"], expression["gaze_rad"]
+            for camera in expression["cameras"]:
+                del camera["gains"]
+
+    edit_json(tmp_path / "h", age)
+    loaded = load_head(tmp_path / "h")
+    assert loaded.shading == SHADING
+    for expression in loaded.expressions.values():
+        assert expression.units == {}
+        np.testing.assert_array_equal(expression.gaze, np.zeros((2, 2)))
+    for view in loaded.views:
+        np.testing.assert_array_equal(view.gains, np.ones(3))
 
 
 def test_cameras_come_back_to_the_last_bit(small_head: Head, saved: Path) -> None:
@@ -256,6 +302,31 @@ def test_a_truncated_file_is_named(saved: Path, file: str, message: str, keep: f
         (
             lambda data: data["expressions"].update(awe={"texture": "atlas", "cameras": []}),
             r"geometry\.npz: vertices/awe: missing",
+        ),
+        (
+            lambda data: data["expressions"]["joy"].update(units={"jawOpen": "wide"}),
+            r"expressions\.joy\.units\.jawOpen: expected a number, found 'wide'",
+        ),
+        (
+            lambda data: data["expressions"]["joy"].update(units=[1]),
+            r"expressions\.joy\.units: expected an object",
+        ),
+        (
+            lambda data: data["expressions"]["joy"]["gaze_rad"].pop("left"),
+            r"expressions\.joy\.gaze_rad\.left: missing",
+        ),
+        (
+            lambda data: data["expressions"]["joy"]["gaze_rad"]["right"].update(yaw="left"),
+            r"expressions\.joy\.gaze_rad\.right\.yaw: expected a number",
+        ),
+        (
+            lambda data: data["shading"].update(eyes=[1, 2]),
+            r"shading\.eyes: expected shape \(3\), got shape \(2,\)",
+        ),
+        (lambda data: data["shading"].pop("teeth"), "shading: expected eyes and teeth, got eyes"),
+        (
+            lambda data: data["expressions"]["joy"]["cameras"][0].update(gains=[1, 0, 1]),
+            "gains: expected numbers above 0",
         ),
         (
             lambda data: data["textures"].update(atlas="../../secret.png"),
