@@ -82,6 +82,7 @@ HEADER = (
     "OpenGL",
     "CPU ms a frame: mien",
     "OpenGL",
+    "OpenGL / mien",
     "peak MiB: mien",
     "OpenGL",
     "pictures differ: mean",
@@ -97,15 +98,16 @@ def compare(work: Path, textures: Sequence[int]) -> str:
         for count in textures:
             ours, theirs = work / "mien.npy", work / "gl.npy"
             mien = draw("render_mien", size, count, ours)
-            name = f"{size[0]}x{size[1]}, {count} textures"
+            name = f"{size[0]}x{size[1]}, {count} texture{'s' * (count > 1)}"
             if not render_gl.is_installed():
-                pairs = ((mien.fps, "-", "-"), (mien.best_fps, "-"), (mien.cpu_ms, "-"))
+                pairs = ((mien.fps, "-", "-"), (mien.best_fps, "-"), (mien.cpu_ms, "-", "-"))
                 rows.append([name, *itertools.chain(*pairs), mien.peak_mb, *"----"])
                 continue
             peer = draw("render_gl", size, count, theirs)
             figures = (mien.fps, peer.fps, mien.fps / peer.fps, mien.best_fps, peer.best_fps)
-            costs = (mien.cpu_ms, peer.cpu_ms, mien.peak_mb, peer.peak_mb)
-            rows.append([name, *figures, *costs, *difference(ours, theirs)])
+            costs = (mien.cpu_ms, peer.cpu_ms, peer.cpu_ms / mien.cpu_ms)
+            memory = (mien.peak_mb, peer.peak_mb)
+            rows.append([name, *figures, *costs, *memory, *difference(ours, theirs)])
     return markdown_table(HEADER, rows)
 
 
@@ -124,8 +126,14 @@ def growth_with_texels(work: Path) -> str:
     rows = []
     for texels in (1024, 2048, 4096):
         drawn = draw("render_mien", SIZES[0], 4, work / "picture.npy", texels=texels)
-        rows.append([f"{texels}x{texels}", drawn.fps, drawn.best_fps, drawn.peak_mb])
-    header = ("mien, 600x800, 4 textures of", "frames/s", "fastest tenth", "peak MiB")
+        rows.append([f"{texels}x{texels}", drawn.cpu_ms, drawn.fps, drawn.best_fps, drawn.peak_mb])
+    header = (
+        "mien, 600x800, 4 textures of",
+        "CPU ms a frame",
+        "frames/s",
+        "fastest tenth",
+        "peak MiB",
+    )
     return markdown_table(header, rows)
 
 
