@@ -16,11 +16,11 @@ from PIL import Image, ImageDraw
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.camera import Camera
-from mien.expressions.contacts import Mechanics, fit_units
 from mien.expressions.gaze import SIDES
+from mien.expressions.state import FaceState
 from mien.formats.head_folder import load_head
-from mien.model.head import ATLAS, Head
-from mien.render.shade import render
+from mien.model.head import Head
+from mien.render.picture import HeadRenderer
 
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "face-units.jpg"
 _TILE = (200, 240)
@@ -41,17 +41,17 @@ def main(folder: str) -> None:
 
 
 def _tiles(head: Head, generic: GenericHead) -> Iterable[UInt8[Array, "h w 3"]]:
-    neutral = np.array(head.mesh.vertices)
-    units = fit_units(generic, neutral)
-    mechanics = Mechanics.of(generic, neutral, units)
-    places = _places(generic, neutral)
+    renderer = HeadRenderer(head)
+    places = _places(generic, head.mesh.vertices)
     for name in generic.unit_names:
         weights = {name: 1.0, **_WITH.get(name, {})}
-        added = [weight * units[generic.unit_names.index(key)] for key, weight in weights.items()]
-        posed = mechanics.applied(neutral + sum(added), weights)
+        state = FaceState(units=weights)
         front = _look_at((places["eyes"] + places["mouth"]) / 2, width_mm=190)
         near = _near(name, places)
-        faces = [_picture(head, posed, camera) for camera in (front, near)]
+        faces = [
+            renderer.draw(state, camera, background=_BACKGROUND)[..., :3]
+            for camera in (front, near)
+        ]
         yield _labelled(np.hstack(faces), " + ".join(weights))
 
 
@@ -81,12 +81,6 @@ def _look_at(target: Float[Array, " 3"], *, width_mm: float, yaw: float = 0.0) -
     rotation = np.diag([1.0, -1.0, -1.0]) @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
     place = np.array([0, 0, _DISTANCE_MM]) - rotation @ target
     return Camera(*_TILE, _TILE[0] * _DISTANCE_MM / width_mm, rotation, place)
-
-
-def _picture(head: Head, vertices: Float[Array, "v 3"], camera: Camera) -> UInt8[Array, "h w 3"]:
-    mesh = head.mesh.with_vertices(vertices)
-    image = render(mesh, camera, head.textures[ATLAS], samples=9, background=_BACKGROUND)
-    return image[..., :3]
 
 
 def _labelled(image: UInt8[Array, "h w 3"], text: str) -> Array:

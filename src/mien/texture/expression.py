@@ -28,6 +28,7 @@ _REACH_MM, _SKIN_REACH_MM = 6.0, 2.0
 _PARTS_FEATHER_MM = 0.7
 """Eyes and teeth are seen through slits: little of them would be left of a wider ramp."""
 _RAMP_MM, _SLIT_MM = 14.0, 3.0
+_FINE_MM, _MOST_ENLARGED = 0.5, 4
 _ENOUGH = 2000
 """Texels that both show for their exposures to be compared."""
 _MOST_GAIN = 1.6
@@ -89,6 +90,7 @@ def look_at_expression(
     solid = mesh.submesh(
         mesh.triangles_of(*(name for name in mesh.part_names if name not in SEE_THROUGH))
     )
+    enlarged = [_enlarged(*pair) for pair in zip(cameras, photos, strict=True)]
     views = [
         prepare_view(
             solid,
@@ -100,7 +102,7 @@ def look_at_expression(
             edge_mm=0.0,
             hidden_mm=0.0,
         )
-        for camera, photo in zip(cameras, photos, strict=True)
+        for camera, photo in enlarged
     ]
     skin = parts_of(surface, mesh, "skin")
     mask = over_vertices(surface, mesh, within[:, None])[..., 0]
@@ -118,6 +120,19 @@ def look_at_expression(
     share *= mask
     known = np.where(outer, seen.confidence, narrow.confidence)
     return ExpressionLook(colours, share.astype(np.float32), known, gains)
+
+
+def _enlarged(camera: Camera, photo: UInt8[Array, "h w 3"]) -> tuple[Camera, UInt8[Array, "h w 3"]]:
+    """A small photo enlarged: what is seen through a slit of two pixels is seen."""
+    import cv2
+
+    pixel_mm = float(camera.t_cam_head[2]) / camera.focal_px
+    factor = min(_MOST_ENLARGED, int(np.ceil(pixel_mm / _FINE_MM)))
+    if factor <= 1:
+        return camera, photo
+    size = (camera.width * factor, camera.height * factor)
+    large: Array = cv2.resize(photo, size, interpolation=cv2.INTER_CUBIC)
+    return camera.resized(factor), large
 
 
 def _ramp(seen: Blend, outer: Bool[Array, "h w"], surface: SurfaceMap) -> Float[Array, "h w"]:

@@ -16,9 +16,9 @@ _WIDTHS: Mapping[str, tuple[float, ...]] = {
 }
 _INCISOR_MM = 10.5
 """Of the generic head's arch, which is wider than people's."""
-_CROWN_MM = 9.5
+_CROWN_MM = 12.0
 """From the biting edge to the gum."""
-_ENAMEL, _GUM = (226.0, 212.0, 190.0), (186.0, 100.0, 94.0)
+_ENAMEL, _GUM = (226.0, 212.0, 190.0), (152.0, 86.0, 80.0)
 _GAP_MM, _GAP_DEPTH = 0.7, 0.5
 _FAR_MM, _FAR_LIGHT = 45.0, 0.5
 """Teeth so far behind the foremost get so little light."""
