@@ -31,6 +31,7 @@ MAX_SAMPLES = 240
 _SAMPLE_SECONDS = 0.099
 _ANALYSIS_SIDE = 640
 _SHARPNESS_SIDE = 192
+_BLOCK = 8
 _USUAL_RATE = 25
 _PQ, _HLG = 16, 18
 
@@ -258,7 +259,8 @@ def _judge(
 
 
 def _sharpness(pixels: UInt8[Array, "h w 3"], face: DetectedFace) -> float:
-    """Variance of the Laplacian over the face, at one size for all and free of contrast."""
+    """Variance of the Laplacian over the face, at one size for all and free of contrast, less where
+    the edges are those of the coder's blocks."""
     import cv2
 
     factor = max(pixels.shape) / min(max(pixels.shape), _ANALYSIS_SIDE)
@@ -268,7 +270,23 @@ def _sharpness(pixels: UInt8[Array, "h w 3"], face: DetectedFace) -> float:
     if crop.size == 0:
         return 0.0
     grey = cv2.cvtColor(np.ascontiguousarray(crop), cv2.COLOR_RGB2GRAY).astype(np.float64)
-    return float(cv2.Laplacian(grey, cv2.CV_64F).var() / (grey.var() + 1.0))
+    sharpness = float(cv2.Laplacian(grey, cv2.CV_64F).var() / (grey.var() + 1.0))
+    return sharpness / _blockiness(pixels) ** 2
+
+
+def _blockiness(pixels: UInt8[Array, "h w 3"]) -> float:
+    """How much larger steps are at the borders of 8x8 blocks than inside: 1 where none shows.
+
+    The first frames of a clip are often coded so coarsely that blocks are most of what they show.
+    """
+    grey = pixels[..., 1].astype(np.float32)
+    ratios = []
+    for image in (grey, grey.T):
+        steps = np.abs(np.diff(image, axis=1)).mean(axis=0)
+        border = np.arange(len(steps)) % _BLOCK == _BLOCK - 1
+        if border.any():
+            ratios.append(float(steps[border].mean() / max(float(steps[~border].mean()), 1e-3)))
+    return max(1.0, float(np.mean(ratios or [1.0])))
 
 
 def _fetch(
