@@ -64,6 +64,8 @@ def test_importing_mien_loads_nothing_heavy() -> None:
     assert heavy_modules_after("import mien\nmien.InputError") == []
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["build", "--help"], ["render", "--help"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], *([name, "--help"] for name in ("build", "render", "animate"))]
+)
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
     assert heavy_modules_after(f"from mien.app.cli import main\nmain({arguments})") == []

@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from glb_file import Glb
+from mien.build import BuildOptions
 from mien.errors import InputError
 from terminal import Built, Mien
 
@@ -29,6 +32,48 @@ def test_the_glb_holds_the_face_units(built: Built, mien: Mien, tmp_path: Path) 
     assert {"jawOpen", "eyeBlinkLeft", "mouthSmileRight"} <= set(names)
 
 
+def test_the_glb_holds_the_expressions(expressive: Path, mien: Mien, tmp_path: Path) -> None:
+    out = tmp_path / "head.glb"
+    mien("export", expressive, "-o", out)
+    names = Glb(out.read_bytes()).json["meshes"][0]["extras"]["targetNames"]
+    assert len(names) == 54
+    assert {"joy", "anger"} <= set(names)
+
+
+def test_an_obj_holds_one_expression(expressive: Path, mien: Mien, tmp_path: Path) -> None:
+    corners = []
+    for name in ("neutral", "joy"):
+        out = tmp_path / f"{name}.obj"
+        assert mien("export", expressive, "-o", out, "--expression", name).status == 0
+        lines = [line.split()[1:] for line in out.read_text().splitlines() if line.startswith("v ")]
+        corners.append(np.array(lines, float))
+    smile = np.linalg.norm(corners[1] - corners[0], axis=1)
+    assert 5 < smile.max() < 30
+    assert (tmp_path / "joy.png").read_bytes() != (tmp_path / "neutral.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "expression", "message"),
+    [
+        ("a.obj", "joi", "expression: expected one of neutral, joy, anger, got joi"),
+        ("a.glb", "joy", "a.glb: expected an .obj for joy alone, got .glb, which holds all"),
+    ],
+)
+def test_an_expression_that_cannot_be_exported(
+    name: str,
+    expression: str,
+    message: str,
+    expressive: Path,
+    mien: Mien,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    error = mien("export", expressive, "-o", name, "--expression", expression).error
+    assert error == message
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_unknown_suffix_is_refused(built: Built, mien: Mien, tmp_path: Path) -> None:
     error = mien("export", built.folder, "-o", tmp_path / "head.fbx").error
     expected = "expected a name that ends in .glb, .obj or .usdz, got .fbx"
@@ -48,6 +93,8 @@ def test_an_unknown_suffix_is_refused(built: Built, mien: Mien, tmp_path: Path) 
         (["build", "photos", "-o", "head", "--interpupillary-mm", "6"], "Invalid value for '--int"),
         (["build", "photos", "-o", "head", "--interpupillary-mm", "nan"], "Invalid value for '--i"),
         (["build", "photos", "-o", "head", "--frames", "0"], "Invalid value for '--frames'"),
+        (["build", "photos", "-o", "head", "--expressions", "0"], "--expressions: expected a num"),
+        (["animate", "take.json", "-o", "take.mp4"], "Missing option '--head'"),
     ],
 )
 def test_a_mistyped_command_is_one_line(arguments: list[str], message: str, mien: Mien) -> None:
@@ -60,6 +107,24 @@ def test_help_goes_to_stdout(mien: Mien) -> None:
         assert ran.status == 0
         assert ran.err == ""
         assert "Photo" in ran.out
+    assert "timeline" in mien("animate", "--help").out
+
+
+@pytest.mark.parametrize(
+    ("given", "passed"), [((), None), (("none",), 0), (("None",), 0), (("3",), 3)]
+)
+def test_how_many_expressions_to_pick(
+    given: tuple[str, ...], passed: int | None, mien: Mien, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[BuildOptions] = []
+
+    def ask(source: object, folder: object, *, options: BuildOptions, **others: object) -> None:
+        asked.append(options)
+        raise InputError("x", "y", "z")
+
+    monkeypatch.setattr("mien.build.build_head_folder", ask)
+    mien("build", "clip.mp4", "-o", "head", *(("--expressions", *given) if given else ()))
+    assert [options.expressions for options in asked] == [passed]
 
 
 def fail(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:

@@ -144,6 +144,8 @@ def test_expression_folders_may_repeat_the_photos_names(
         marks = source / expression / "annotations" / "a.json"
         shutil.copy(james / "annotations" / f"{side}.json", marks)
     head = tmp_path / "head"
+    said = mien("build", source, "-o", head, "--texture-size", 64)
+    assert said.out.splitlines()[1] == "  expressions: neutral, joy"
     ran = mien("build", source, "-o", head, "--texture-size", 64, "--json")
     photos = {name: views[0]["photo"] for name, views in ran.json["expressions"].items()}
     assert photos == {"neutral": "neutral/a.png", "joy": "joy/a.png"}

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mien.app.demo import TURNTABLE, UNITS, YAWS, demo_photos, run_demo
+from mien.app.demo import PERFORMANCE, TURNTABLE, UNITS, YAWS, demo_photos, run_demo
 from mien.assets.generic import load_generic_head
 from mien.formats.head_folder import load_head
+from mien.formats.timeline_json import load_timeline
 from terminal import SHORT_TURNTABLE, Mien, Ran
 
 
@@ -31,11 +32,12 @@ class Links(HTMLParser):
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The real one, once, but for a short turntable."""
+    """The real one, once, but for a short turntable and few frames of the performance."""
     stages: list[tuple[str, int, int]] = []
     folder = tmp_path_factory.mktemp("demo") / "demo"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mien.build.turntable_frames", SHORT_TURNTABLE)
+        patch.setattr("mien.app.demo._FPS", 2)
         index = run_demo(folder, progress=lambda *told: stages.append(told))
     assert index == folder / "index.html"
     finished = {stage for stage, done, total in stages if done == total}
@@ -74,6 +76,20 @@ def test_the_photos_and_the_head_are_james(demo: Path) -> None:
         with Image.open(kept[0]) as image, Image.open(kept[1]) as given:
             np.testing.assert_array_equal(np.asarray(image), np.asarray(given.convert("RGB")))
     assert not head.left_out
+
+
+def test_the_sample_timeline_is_performed_and_shown(demo: Path) -> None:
+    import av
+
+    with av.open(demo / PERFORMANCE) as container:
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert len(frames) == 20
+    assert frames[0].shape == (600, 480, 3)
+    moved = [np.abs(frame.astype(int) - frames[0]).mean() for frame in frames]
+    assert max(moved) > 2
+    page = (demo / "index.html").read_text(encoding="utf-8")
+    assert f'<video src="{PERFORMANCE}"' in page
+    assert load_timeline(demo / "sample_timeline.json").duration == 10
 
 
 def test_the_glb_is_whole(demo: Path) -> None:

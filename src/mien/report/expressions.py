@@ -64,7 +64,8 @@ def face_psnr(
     picture = renderer.draw(FaceState({FACE: {name: 1.0}}), view.camera)
     colours = np.clip(np.rint(picture[..., :3] / view.gains), 0, 255).astype(np.uint8)
     picture = np.concatenate([colours, picture[..., 3:]], axis=2)
-    inside = _face_pixels(renderer.head, name, view.camera)
+    # At the head's outline the photo has something else in its pixels.
+    inside = _face_pixels(renderer.head, name, view.camera) & (picture[..., 3] == 255)
     squared = (colours[inside].astype(np.float64) - photo[inside]) ** 2
     psnr = 10 * np.log10(255**2 / max(float(squared.mean()), 1e-2)) if inside.any() else 0.0
     return psnr, picture
