@@ -32,6 +32,8 @@ _MIDLINE_MM = 12.0
 """Width over which left gives way to right."""
 _RAMP = (0.3, 0.8)
 """Between upper lid (0) and brow (1): where the eyes' region gives way to the forehead's."""
+_AT_LIDS = 0.8
+"""Of the generic mask of the eyes: from there on, lids and their margins too, all is theirs."""
 _PARTS = {
     "left_eyeball": "eyes",
     "right_eyeball": "eyes",
@@ -52,9 +54,11 @@ def default_masks(generic: GenericHead) -> dict[str, Float[Array, " v"]]:
     regions, left = generic.regions, _left_share(generic.mesh.vertices[:, 0])
     mouth = np.maximum(regions["mouth"], regions["mouth_cavity"])
     socket = regions["eye_socket"] * (1 - regions["mouth_cavity"])
-    eyes = np.maximum(regions["eyes"], socket)
-    forehead = regions["forehead"] + eyes * _above_lids(generic)
-    eyes = eyes * (1 - _above_lids(generic))
+    eyes = np.maximum(np.minimum(regions["eyes"] / _AT_LIDS, 1.0), socket)
+    mouth = np.minimum(mouth, 1 - eyes)
+    above = _above_lids(generic) * (1 - socket)
+    forehead = regions["forehead"] + eyes * above
+    eyes = eyes * (1 - above)
     whole = {"mouth": mouth, "eyes": eyes, "forehead": forehead}
     for part, region in _PARTS.items():
         inside = np.unique(generic.mesh.triangles[generic.mesh.triangles_of(part)])
