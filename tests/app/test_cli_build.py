@@ -144,12 +144,12 @@ def test_expression_folders_may_repeat_the_photos_names(
         marks = source / expression / "annotations" / "a.json"
         shutil.copy(james / "annotations" / f"{side}.json", marks)
     head = tmp_path / "head"
-    said = mien("build", source, "-o", head, "--texture-size", 64)
-    assert said.out.splitlines()[1] == "  expressions: neutral, joy"
-    ran = mien("build", source, "-o", head, "--texture-size", 64, "--json")
-    photos = {name: views[0]["photo"] for name, views in ran.json["expressions"].items()}
+    ran = mien("build", source, "-o", head, "--texture-size", 64)
+    assert ran.out.splitlines()[1] == "  expressions: neutral, joy"
+    made = load_head(head)
+    photos = {name: item.views[0].photo for name, item in made.expressions.items()}
     assert photos == {"neutral": "neutral/a.png", "joy": "joy/a.png"}
-    assert set(load_head(head).textures) == {"atlas", "cylinder", "joy"}
+    assert set(made.textures) == {"atlas", "cylinder", "joy"}
     for name, side in (("neutral", "left"), ("joy", "right")):
         kept = (head / "photos" / name / "a.png").read_bytes()
         with Image.open(io.BytesIO(kept)) as image, Image.open(james / f"{side}.png") as given:
