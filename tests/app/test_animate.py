@@ -206,7 +206,7 @@ def test_past_what_was_photographed_is_noted_once(
     ran = mien("animate", path, "--head", expressive, "-o", tmp_path / "a.csv")
     (note,) = ran.err.strip().splitlines()[-1:]
     assert note.startswith("note: face: past what was photographed (weights outside 0 to 1): ")
-    assert note.endswith(" at 0.10 s")
+    assert note.endswith(" at 0.40 s"), "where it goes farthest"
     assert ran.err.count("note: ") == 1
 
 

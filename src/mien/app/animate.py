@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,9 +14,10 @@ from mien.animate.timeline import Moment, Timeline
 from mien.app.explained import units_of
 from mien.arrays import Array, UInt8
 from mien.errors import FileFormatError, InputError
+from mien.expressions.state import FaceState
 from mien.formats.timeline_check import check_timeline
 from mien.formats.timeline_file import load_performance
-from mien.model.head import Head
+from mien.model.head import NEUTRAL, Head
 from mien.render.picture import HeadRenderer
 
 if TYPE_CHECKING:
@@ -123,19 +124,33 @@ def animate_head(
 
 
 def _hull_notes(job: _Job, name: str | Path) -> tuple[str, ...]:
-    """What goes beyond the photographed expressions, and when first; before any frame is drawn.
+    """What goes beyond the photographed expressions, and when farthest; before a frame is drawn.
 
     Raises: FileFormatError: weights that no face may have, and when.
     """
-    notes: dict[str, str] = {}
+    rig = job.renderer.rig
+    farthest: dict[str, tuple[float, float, Mapping[str, float]]] = {}
     for moment in job.timeline.moments_at(job.times):
         try:
-            for note in job.renderer.rig.hull_notes(moment.state):
-                region = note.partition(":")[0]
-                notes.setdefault(region, f"{note} at {moment.time:.2f} s")
+            rig.hull_notes(moment.state)
         except InputError as error:
             raise FileFormatError(name, str(error), f"at {moment.time:.2f} s") from None
-    return tuple(notes.values())
+        for region, weights in moment.state.expressions.items():
+            beyond = _beyond(weights)
+            if region not in farthest or beyond > farthest[region][0]:
+                farthest[region] = beyond, moment.time, weights
+    return tuple(
+        f"{note} at {time:.2f} s"
+        for region, (_, time, weights) in farthest.items()
+        for note in rig.hull_notes(FaceState({region: weights}))
+    )
+
+
+def _beyond(weights: Mapping[str, float]) -> float:
+    """How far the farthest weight, neutral's too, lies outside of 0 to 1; negative inside."""
+    given = list(weights.values())
+    every = given if NEUTRAL in weights else [1 - sum(given), *given]
+    return max(max(-weight, weight - 1) for weight in every)
 
 
 def _writer(path: str | Path) -> Callable[[_Job, str | Path], int]:
