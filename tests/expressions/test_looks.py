@@ -24,7 +24,7 @@ SKIN, EYES, TEETH = (190, 150, 130), (170, 190, 210), (210, 200, 160)
 """In full light."""
 SHAPES = {
     "neutral": REST,
-    "asleep": explained_by({"eyeBlinkLeft": 0.95, "eyeBlinkRight": 0.95}),
+    "asleep": explained_by({"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0}),
     "awe": explained_by(
         {
             "jawOpen": 0.35,
