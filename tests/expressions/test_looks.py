@@ -105,7 +105,7 @@ def test_eyes_that_only_neutral_shows_serve_a_face_asleep(part: str) -> None:
     shown = rightly_shown("neutral", part)
     assert shown.sum() > 100
     assert np.median(off("asleep", shown)) <= 2
-    assert np.percentile(off("asleep", shown), 75) <= 10
+    assert np.mean(off("asleep", shown) <= 10) > 0.6
     assert truth("asleep")[shown].mean() < 0.75 * truth("neutral")[shown].mean()
 
 
