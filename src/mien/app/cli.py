@@ -217,7 +217,8 @@ def animate(
     ],
     head: Annotated[Path, typer.Option(help="A head folder that `mien build` made.")],
     fps: Annotated[
-        float | None, typer.Option(help="Frames a second; the timeline's by default.")
+        float | None,
+        typer.Option(min=0.01, max=1000, help="Frames a second; the timeline's by default."),
     ] = None,
     size: Annotated[
         str | None, typer.Option(help="WIDTHxHEIGHT in px; the timeline's by default.")
@@ -241,7 +242,7 @@ def animate(
             load_head(head),
             timeline,
             output,
-            fps=None if fps is None else check_finite("--fps", fps),
+            fps=fps,
             size=width_height,
             yaw=_angle("--yaw", yaw),
             pitch=_angle("--pitch", pitch),
