@@ -35,7 +35,7 @@ def test_each_is_the_farthest_from_all_before(rng: np.random.Generator) -> None:
         distance = np.minimum(distance, expression_distance(scores.blendshapes, row))
 
 
-@pytest.mark.parametrize(("score", "chosen"), [(0.59, []), (0.61, [1])])
+@pytest.mark.parametrize(("score", "chosen"), [(DIFFERENT - 0.01, []), (DIFFERENT + 0.01, [1])])
 def test_what_differs_too_little_is_no_expression(score: float, chosen: list[int]) -> None:
     scores = clip([0, 0], scores=[REST, scored(jawOpen=score)])
     assert choose_expressions(scores, 0).tolist() == chosen

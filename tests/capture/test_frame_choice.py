@@ -53,9 +53,12 @@ def test_brows_at_rest_are_where_they_are_most_of_the_time() -> None:
     assert choose_frames(scores, 7).tolist() == [1, 2, 3]
 
 
-def test_a_head_that_hardly_turns_gives_the_frame_most_at_rest() -> None:
-    smiles = [scored(mouthSmile=score) for score in (0.1, 0.05, 0.0, 0.1)]
-    assert choose_frames(clip([0, 3, 9, 6], scores=smiles), 7).tolist() == [2]
+def test_a_head_that_hardly_turns_gives_the_sharpest_frame_at_rest() -> None:
+    smiles = [scored(mouthSmile=score) for score in (0.2, 0.05, 0.0, 0.2)]
+    at_rest = clip([0, 3, 9, 6], sharpness=[1.0, 0.8, 0.9, 1.0], scores=smiles)
+    assert choose_frames(at_rest, 7).tolist() == [2]
+    at_rest.sharpness[1] = 0.95
+    assert choose_frames(at_rest, 7).tolist() == [1]
     assert len(choose_frames(clip([0, 3, 11, 6], scores=smiles), 7)) > 1
 
 

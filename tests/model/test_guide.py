@@ -68,8 +68,8 @@ def test_a_measured_surface_keeps_its_place(mm: float) -> None:
     moves = guided - start
     normals = GENERIC.mesh.with_vertices(start).vertex_normals()
     across = np.abs((moves * normals).sum(axis=1))[FACE]
-    assert np.median(across) < 0.02
-    assert np.percentile(across, 95) < 0.3
+    assert np.median(across) < 0.05
+    assert np.percentile(across, 95) < 0.5
     assert np.median(off_mm(guided)) < 0.75 * np.median(off_mm(start)), "and yet they are nearer"
 
 

@@ -8,7 +8,7 @@ from mien.arrays import Array, Float, Int
 from mien.capture.frame_choice import FrameScores, expression_distance, sharp_rows
 from mien.capture.mediapipe_face import BLENDSHAPE_NAMES
 
-DIFFERENT = 0.6
+DIFFERENT = 0.55
 """Scores that two expressions of one person differ by at least."""
 MOST = 8
 """As many expressions besides neutral are picked unless a number is asked for."""

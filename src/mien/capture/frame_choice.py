@@ -19,8 +19,9 @@ _OF_MOUTH = np.array([name.startswith(("mouth", "jaw", "cheekPuff")) for name in
 _SAME_EXPRESSION = 0.6
 _OPEN_LIPS = 4.0
 """What lips that are apart by the distance of the eyes cost, in scores."""
-_RESTLESS = 0.2
-"""How much less at rest a frame may be than the one most at rest."""
+_RESTLESS, _AT_REST = 0.35, 0.1
+"""How much less at rest a frame may be than the one most at rest: where the head turns, for scores
+shift with it, and where it does not."""
 _SHARP_SHARE = 0.5
 _SAME_POSE, _ONE_SIDE = np.radians(3), np.radians(10)
 
@@ -50,13 +51,15 @@ def choose_frames(scores: FrameScores, count: int) -> Int[Array, " m"]:
     Among frames that are sharp and show the face at rest, begins with the most frontal one and goes
     on to whichever pose is farthest from all chosen so far, taking the
     sharpest frame near that pose, until every pose left is within 3 degrees of a chosen one. Where
-    the head turns by less than 10 degrees, the frame most at rest is enough.
+    the head turns by less than 10 degrees, the sharpest of those most at rest is enough.
     """
     usable = _usable(scores)
     pose, sharpness = scores.pose[usable], scores.sharpness[usable]
     if np.ptp(pose, axis=0).max() < _ONE_SIDE:
         # More would tell no depth, and blur the texture.
-        return usable[[int(_unrest(scores)[usable].argmin())]]
+        unrest = _unrest(scores)[usable]
+        at_rest = unrest <= unrest.min() + _AT_REST
+        return usable[[int(np.where(at_rest, sharpness, -np.inf).argmax())]]
     distance = np.linalg.norm(pose, axis=1)
     target = int(distance.argmin())
     distance = np.full(len(pose), np.inf)

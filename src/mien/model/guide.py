@@ -20,7 +20,7 @@ from mien.model.skin import move_skin
 
 EDGE_MM = 1.0
 """How far a landmark on a visible edge lies off it, seen squarely."""
-ACROSS_SD_MM = 0.3
+ACROSS_SD_MM = 1.0
 """How far the surface itself may give way where several photos have measured it."""
 
 

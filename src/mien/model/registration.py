@@ -34,8 +34,9 @@ NOTHING_SHARED = (
 FAR_TURN_DEG = 25.0
 """Landmarks leave cameras up to 16 degrees off."""
 CONTRADICTED = (
-    "the photos look from too nearly one side to be registered with each other (what would follow "
-    "contradicts the landmarks): cameras and shape rest on marks and landmarks alone"
+    "the photos could not be registered with each other (what would follow contradicts the "
+    "landmarks, as where all look from nearly one side): cameras and shape rest on marks and "
+    "landmarks alone"
 )
 MOST_MISFIT = 1.5
 """Expected errors by which the landmarks on edges lie off in the median. Registered heads have 0.4

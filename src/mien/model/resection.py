@@ -12,7 +12,8 @@ from mien.capture.source import View
 from mien.errors import EstimationError
 from mien.model.features import Features
 
-_LEAST = 4
+LEAST_FEATURES = 4
+"""With fewer, several cameras would do."""
 
 
 def place_cameras(
@@ -41,7 +42,7 @@ def _place(
 ) -> Camera:
     import cv2
 
-    if len(places) < _LEAST:
+    if len(places) < LEAST_FEATURES:
         raise EstimationError(f"{view.photo.name}: {len(places)} points are too few for a camera")
     width, height = view.photo.size
     centred = image - [width / 2, height / 2]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from mien.arrays import Array, Float, Int
+from mien.arrays import Array, Bool, Float, Int
 from mien.camera import Camera
 from mien.model.dense.projection import Pinholes, Projection, project_places
 from mien.numeric.robust import loss_named
@@ -34,6 +34,10 @@ class Sightings:
         """Per-vertex values at the places."""
         at: Array = np.einsum("mc,...mcd->...md", self.barycentrics, values[..., self.corners, :])
         return at
+
+    def of(self, keep: Bool[Array, " m"]) -> Sightings:
+        """Some of them."""
+        return Sightings(*(getattr(self, field.name)[keep] for field in fields(self)))
 
     def joined(self, other: Sightings) -> Sightings:
         """These and others of the same photos."""

@@ -26,12 +26,14 @@ from expressive import (
 from marbled import GENERIC, Person, at
 from mien.arrays import Array
 from mien.camera import Camera
+from mien.capture.annotations import Annotations
 from mien.capture.detector import NO_FACE
 from mien.capture.mediapipe_face import BLENDSHAPE_NAMES
 from mien.capture.source import View
 from mien.errors import EstimationError
 from mien.model.expression.fit import (
     SAME_LENS_SD,
+    STRANGE_SKIN,
     ExpressionFit,
     _expected_units,
     _lenses,
@@ -144,8 +146,36 @@ def test_no_face_at_all() -> None:
         replace(view, landmarks=None, photo=replace(view.photo, name=name))
         for name in ("a.png", "b.png")
     ]
-    with pytest.raises(EstimationError, match=rf"^a\.png, b\.png: {NO_FACE}"):
+    with pytest.raises(EstimationError, match=rf"^a\.png: {NO_FACE}; b\.png: {NO_FACE}"):
         fit_expression(faceless, known_head())
+
+
+def test_too_few_marks_leave_a_photo_out() -> None:
+    (view,) = shown(smiling(), CAMERAS["one photo"])
+    points = {name: np.array([100.0, 100.0]) for name in ("chin", "nose_tip", "nose_root")}
+    few = replace(
+        view,
+        landmarks=None,
+        annotations=Annotations(points, {}),
+        photo=replace(view.photo, name="few.png"),
+    )
+    fit = fit_expression([view, few], known_head())
+    assert fit.left_out == {"few.png": "3 points are too few for a camera"}
+    with pytest.raises(EstimationError, match=r"few\.png: 3 points"):
+        fit_expression([few], known_head())
+
+
+def test_skin_that_is_not_neutrals_leads_nothing() -> None:
+    """Another person's skin under exact landmarks: landmarks alone decide, and a note says so."""
+    (seen_from,) = CAMERAS["one photo"]
+    strange = exactly_detected(
+        Person(smiling(), 7).seen_by(seen_from, name="0.png"), seen_from, smiling()
+    )
+    fit = fit_expression([strange], known_head())
+    found = fit.photos["0.png"].camera
+    assert np.degrees(angle_between(found.R_cam_head, seen_from.R_cam_head)) < 0.5
+    assert fit.notes == (STRANGE_SKIN.format("0.png"),)
+    assert fitted("one photo").notes == ()
 
 
 def test_eyes_that_look_aside_are_found_and_move_no_camera() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,17 +18,22 @@ from mien.model.expression.explain import Explained, explain
 from mien.model.expression.follow import follow_skin
 from mien.model.expression.gaze import MOST_RAD, iris_directions, yaw_pitch_of
 from mien.model.expression.known import KnownHead, feature_sightings
-from mien.model.features import Features, gather_features
-from mien.model.landmark_fit import focal_beliefs
-from mien.model.resection import place_cameras
-from mien.model.sightings import Sightings
+from mien.model.features import gather_features
+from mien.model.landmark_fit import focal_beliefs, residuals_of
+from mien.model.resection import LEAST_FEATURES, place_cameras
+from mien.model.sightings import Sightings, measure_misses
 from mien.model.skin import move_skin
-from mien.model.verdict import PhotoFit, judge_marks
+from mien.model.verdict import PhotoFit, find_misfit, judge_marks, typical_misfits
+from mien.numeric.rotation import angle_between
 
 FOLLOWED_MM = (1.6, 0.8)
 """What a pixel shows while skin is followed, from round to round."""
 SAME_LENS_SD = 0.003
 """Of the log focal length of a frame of the clip that the neutral photos come from."""
+MOST_OFF_MM, MOST_TURN_RAD = 2.5, np.deg2rad(8.0)
+"""Skin found again lies 0.8 to 1.7 mm off what the units express, in the median, and turns cameras
+by 1 to 6 degrees from where landmarks put them. Skin that is somebody else's does more."""
+STRANGE_SKIN = "{}: its skin does not look like neutral's: its shape rests on landmarks and marks"
 _STEADY = ("eyeLook", "tongueOut")
 """Units that landmarks do not tell: gaze has the irises, the tongue has nothing."""
 _CLOSED = 0.5
@@ -66,7 +71,7 @@ def fit_expression(
     found again from the neutral photos; what is left moves the skin smoothly. Depth that the
     photos do not tell is the units'.
 
-    Raises: EstimationError: no photo shows a face.
+    Raises: EstimationError: no photo can be used; says why, of each.
     Source: P02 sec. 5.1 with the neutral head as the prior; the units and the dense matching are
         ours.
     """
@@ -75,15 +80,32 @@ def fit_expression(
     tell = progress or (lambda done, total: None)
     left_out = {view.photo.name: NO_FACE for view in views if not view.marked}
     views = [view for view in views if view.marked]
-    if not views:
-        raise EstimationError(f"{', '.join(left_out)}: {NO_FACE}")
+    counts = gather_features(views, known.generic).seen.sum(axis=1) if views else []
+    for view, count in zip(views, counts, strict=True):
+        if count < LEAST_FEATURES:
+            left_out[view.photo.name] = f"{count} points are too few for a camera"
+    views = [view for view in views if view.photo.name not in left_out]
     with threadpool_limits(1, user_api="blas"):
-        return _fit(views, known, left_out, tell)
+        while views:
+            found = _fit(views, known, tell)
+            misfit = find_misfit(found.typical_misfits)
+            if misfit is None:
+                return replace(found.fit, left_out=left_out)
+            worst, why = misfit
+            left_out[views[worst].photo.name] = why
+            views = [view for k, view in enumerate(views) if k != worst]
+    raise EstimationError("; ".join(f"{name}: {why}" for name, why in left_out.items()))
 
 
-def _fit(
-    views: Sequence[View], known: KnownHead, left_out: dict[str, str], tell: Progress
-) -> ExpressionFit:
+@dataclass(frozen=True)
+class _Found:
+    """A fit, and how many expected errors each photo's marks lie off, in the median."""
+
+    fit: ExpressionFit
+    typical_misfits: Float[Array, " k"]
+
+
+def _fit(views: Sequence[View], known: KnownHead, tell: Progress) -> _Found:
     generic = known.generic
     features = gather_features(views, generic)
     focal, focal_sd = _lenses(views, known)
@@ -91,21 +113,61 @@ def _fit(
     expected = _expected_units(views, known)
     free = np.array([not name.startswith(_STEADY) for name in generic.unit_names])
     cameras = place_cameras(views, features, focal, known.vertices)
-    found = Explained(cameras, np.where(free, expected, 0.0))
-    found = explain(sightings, found, expected, focal_sd, known, free=free)
-    vertices = found.vertices(known)
-    held = _held(generic)
+    start = Explained(cameras, np.where(free, expected, 0.0))
+
+    def explained(seen: Sightings, before: Explained) -> Explained:
+        return explain(seen, before, expected, focal_sd, known, free=free)
+
+    found = by_marks = explained(sightings, start)
+    vertices, everything, held = found.vertices(known), sightings, _held(generic)
     for step, scale in enumerate(FOLLOWED_MM):
         tell(step, len(FOLLOWED_MM))
-        vertices = move_skin(vertices, sightings, found.cameras, generic, held=held)
+        vertices = move_skin(vertices, everything, found.cameras, generic, held=held)
         everything = _with_skin(sightings, views, found.cameras, vertices, known, scale)
-        found = explain(everything, found, expected, focal_sd, known, free=free)
+        found = explained(everything, found)
+        strange = _strange_skin(everything, len(sightings.photo), found, by_marks, known)
+        if strange:
+            everything = _without_skin(everything, len(sightings.photo), strange)
+            found = explained(everything, by_marks)
         vertices = found.vertices(known)
     vertices = move_skin(vertices, everything, found.cameras, generic, held=held)
     tell(len(FOLLOWED_MM), len(FOLLOWED_MM))
-    photos = _judged(views, features, found.cameras, vertices)
-    gaze = _gaze(views, found, known)
-    return ExpressionFit(vertices, found.weights, gaze, photos, left_out)
+    residuals = residuals_of(features, found.cameras, vertices)
+    sigma_px = features.sigma_px(found.cameras)
+    photos = {
+        view.photo.name: PhotoFit(camera, judge_marks(features, k, residuals[k], sigma_px[k]))
+        for k, (view, camera) in enumerate(zip(views, found.cameras, strict=True))
+    }
+    notes = tuple(STRANGE_SKIN.format(views[k].photo.name) for k in strange)
+    fit = ExpressionFit(vertices, found.weights, _gaze(views, found, known), photos, {}, notes)
+    return _Found(fit, typical_misfits(residuals, sigma_px))
+
+
+def _strange_skin(
+    sightings: Sightings, first: int, found: Explained, by_marks: Explained, known: KnownHead
+) -> list[int]:
+    """Photos whose skin is not neutral's: what was found again contradicts itself or the marks.
+
+    Args:
+        first: number of the first sighting of skin.
+    """
+    misses = measure_misses(sightings, sightings.on(found.vertices(known)), found.cameras)
+    strange = []
+    for k, (camera, before) in enumerate(zip(found.cameras, by_marks.cameras, strict=True)):
+        mine = np.flatnonzero(sightings.photo[first:] == k) + first
+        if not len(mine):
+            continue
+        mm_per_px = float(camera.t_cam_head[2]) / camera.focal_px
+        off = float(np.median(np.linalg.norm(misses.residuals[mine], axis=1))) * mm_per_px
+        turned = float(angle_between(camera.R_cam_head, before.R_cam_head))
+        if off > MOST_OFF_MM or turned > MOST_TURN_RAD:
+            strange.append(k)
+    return strange
+
+
+def _without_skin(sightings: Sightings, first: int, photos: Sequence[int]) -> Sightings:
+    skin = np.arange(len(sightings.photo)) >= first
+    return sightings.of(~(skin & np.isin(sightings.photo, photos)))
 
 
 def _lenses(
@@ -155,21 +217,6 @@ def _held(generic: GenericHead) -> Float[Array, " v"]:
     still = sum(generic.regions[name] for name in ("scalp", "left_ear", "right_ear"))
     held: Array = np.minimum(np.asarray(still), 1.0)
     return held
-
-
-def _judged(
-    views: Sequence[View],
-    features: Features,
-    cameras: Sequence[Camera],
-    vertices: Float[Array, "v 3"],
-) -> dict[str, PhotoFit]:
-    sigma_px = features.sigma_px(cameras)
-    photos = {}
-    for k, (view, camera) in enumerate(zip(views, cameras, strict=True)):
-        residuals = camera.project(features.on(vertices)) - features.image_points[k]
-        marks = judge_marks(features, k, residuals, sigma_px[k])
-        photos[view.photo.name] = PhotoFit(camera, marks)
-    return photos
 
 
 def _gaze(views: Sequence[View], found: Explained, known: KnownHead) -> Float[Array, "2 2"]:

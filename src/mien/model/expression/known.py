@@ -18,8 +18,9 @@ EXPRESSED_EDGE_MM = 0.8
 """How far a landmark on an edge lies off its place on this person's head, once that is known."""
 EXPRESSED_SKIN_MM = 2.5
 """The same for one on plain skin, which the detector guesses from the edges."""
-_HALF_KNOWN = 0.5
-"""Confidence at which half of what the neutral photos say of a landmark's place is believed."""
+_HALF_BELIEVED = 1.25
+"""Confidence, summed over neutral photos, at which half of what they say of a landmark's place is
+believed: one says little, for landmarks slide from view to view."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,9 @@ def feature_sightings(features: Features, known: KnownHead) -> Sightings:
     person's expressions: where the neutral photos show it off its attachment, it is there in the
     others, too.
     """
-    photo, column = np.nonzero(features.seen)
+    # Irises lie on the eyeballs, which turn by themselves.
+    on_face = known.generic.regions["face"][features.corners].max(axis=1) > 0
+    photo, column = np.nonzero(features.seen & (on_face | features.by_hand))
     beside = _beside(features, known)
     landmark = ~features.by_hand[photo, column]
     on_edge = features.sigma_mm[photo, column] <= 2 * EDGE_SIGMA_MM
@@ -74,7 +77,7 @@ def _beside(features: Features, known: KnownHead) -> Float[Array, "n 3"]:
         moved = (off * mm_per_px[:, None]) @ camera.R_cam_head[:2]
         total[usable] += (confidence[:, None] * moved)[usable]
         weight += confidence
-    mean = total / (weight + _HALF_KNOWN * EDGE_SIGMA_MM)[:, None]
+    mean = total / (weight + _HALF_BELIEVED)[:, None]
     beside = np.zeros((len(features.names), 3))
     for n, name in enumerate(features.names):
         if name in column_of:
