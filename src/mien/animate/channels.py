@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from mien.arrays import Array, Float
 from mien.errors import InputError
+from mien.expressions.regions import AROUND
 from mien.expressions.state import FACE, FaceState, Gaze
 
 HEAD, GAZE, UNITS = "head", "gaze", "units"
@@ -13,20 +14,6 @@ HEAD, GAZE, UNITS = "head", "gaze", "units"
 
 MEMBERS = {HEAD: ("yaw", "pitch", "roll", "x", "y", "z"), GAZE: ("yaw", "pitch")}
 ANGLES = frozenset(f"{group}.{name}" for group in MEMBERS for name in ("yaw", "pitch", "roll"))
-
-AROUND: Mapping[str, tuple[str, ...]] = {
-    FACE: (),
-    "mouth": (FACE,),
-    "eyes": (FACE,),
-    "forehead": (FACE,),
-    "left_mouth": (FACE, "mouth"),
-    "right_mouth": (FACE, "mouth"),
-    "left_eye": (FACE, "eyes"),
-    "right_eye": (FACE, "eyes"),
-    "left_forehead": (FACE, "forehead"),
-    "right_forehead": (FACE, "forehead"),
-}
-"""The regions in which weights of photographed expressions can hold, and those around each."""
 
 REGIONS = tuple(AROUND)
 
