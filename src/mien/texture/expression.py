@@ -27,7 +27,7 @@ _REACH_MM, _SKIN_REACH_MM = 6.0, 2.0
 """How far what is seen goes on where nothing is seen."""
 _PARTS_FEATHER_MM = 0.7
 """Eyes and teeth are seen through slits: little of them would be left of a wider ramp."""
-_RAMP_MM, _SLIT_MM = 14.0, 3.0
+_RAMP_MM, _SLIT_MM = 14.0, 12.0
 _FINE_MM, _MOST_ENLARGED = 0.5, 4
 _ENOUGH = 2000
 """Texels that both show for their exposures to be compared."""
@@ -137,7 +137,7 @@ def _enlarged(camera: Camera, photo: UInt8[Array, "h w 3"]) -> tuple[Camera, UIn
 
 def _ramp(seen: Blend, outer: Bool[Array, "h w"], surface: SurfaceMap) -> Float[Array, "h w"]:
     """(H, W) from 0 where the photos end to 1: wide, for light and exposure differ a little. At
-    lips and lids, whose surroundings are seen from both sides, they do not end."""
+    lips, lids and nostrils, whose surroundings are seen from all sides, they do not end."""
     import cv2
 
     size = 2 * round(_SLIT_MM / surface.texel_mm) + 1
