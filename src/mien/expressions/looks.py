@@ -207,7 +207,8 @@ def _ratio(look: ExpressionLook, other: ExpressionLook, texels: Bool[Array, "h w
     both = texels & (look.seen > _SEEN) & (other.seen > _SEEN)
     if np.count_nonzero(both) < _ENOUGH:
         return None
-    return float(np.median(look.colours[both].mean(axis=1) / other.colours[both].mean(axis=1)))
+    here, there = (np.maximum(item.colours[both].mean(axis=1), 1.0) for item in (look, other))
+    return float(np.median(here / there))
 
 
 def _common_parts(
