@@ -23,8 +23,6 @@ from mien.render.picture import HeadRenderer
 from mien.render.shade import rasterize_mesh, shown_parts
 
 GENERIC = load_generic_head()
-OUTLINE_PX = 2
-"""Along an outline a pixel of the photo shows what is behind, too: hair, the room, teeth."""
 
 
 @dataclass(frozen=True)
@@ -68,15 +66,23 @@ def test_at_least_five_expressions(filmed: Filmed) -> None:
 
 
 def fidelity(filmed: Filmed, name: str) -> float:
-    """PSNR, dB, of the face in its own camera: the best of its photos, if there are several."""
+    """PSNR, dB, of the face in its own camera: the best of its photos, if there are several.
+
+    The face is where both the head has it and the detector's landmarks surround it.
+    """
     face, scores = filmed.expression(name), []
+    outlines = {
+        view.photo.name: cv2.convexHull(view.landmarks.points.astype(np.int32))
+        for view in filmed.build.capture.views
+        if view.landmarks
+    }
     for view in filmed.build.head.expressions[name].views:
         photo = filmed.photos[view.photo].astype(float)
         drawn = filmed.renderer.render(face, view.camera)
         covered, share = filmed.seen(face, GENERIC.regions["face"][:, None], view.camera)
         inside = covered & (share[..., 0] > 0.5) & (drawn[..., 3] == 255)
-        square = np.ones((2 * OUTLINE_PX + 1,) * 2, np.uint8)
-        inside = cv2.erode(inside.astype(np.uint8), square) > 0
+        surrounded = np.zeros(inside.shape, np.uint8)
+        inside &= cv2.fillConvexPoly(surrounded, outlines[view.photo], 1) > 0
         assert inside.sum() > 3000
         error = (drawn[..., :3] / view.gains - photo)[inside]
         scores.append(20 * np.log10(255 / np.sqrt((error**2).mean())))

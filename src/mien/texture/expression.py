@@ -18,16 +18,15 @@ from mien.texture.subject import subject_mask
 from mien.texture.surface import SurfaceMap, over_vertices, parts_of
 from mien.texture.visibility import View, feather, prepare_view
 
-FEATHER_MM = 3.0
+FEATHER_MM = 0.7
+"""What is seen through a slit would be lost in a wider one."""
 _FADE = (0.05, 0.2)
 """Cosines between which colours fade out: steeper than where photos compete, for this one alone
 shows the expression."""
 _PARTS = tuple(name for name, style in STYLES.items() if style.photos == "best")
-_REACH_MM, _SKIN_REACH_MM = 6.0, 2.0
+_REACH_MM = 6.0
 """How far what is seen goes on where nothing is seen."""
-_PARTS_FEATHER_MM = 0.7
-"""Eyes and teeth are seen through slits: little of them would be left of a wider ramp."""
-_RAMP_MM, _SLIT_MM = 14.0, 12.0
+_RAMP_MM, _SLIT_MM = 10.0, 12.0
 _FINE_MM, _MOST_ENLARGED = 0.5, 4
 _ENOUGH = 2000
 """Texels that both show for their exposures to be compared."""
@@ -108,18 +107,14 @@ def look_at_expression(
     mask = over_vertices(surface, mesh, within[:, None])[..., 0]
     gains = _gains(surface, views, below, skin & (mask > 0.5))
     seen = blend_views(surface, views, gains, feather_mm=FEATHER_MM, fade=_FADE)
-    narrow = blend_views(surface, views, gains, feather_mm=_PARTS_FEATHER_MM, fade=_FADE)
     inner = skin & (over_vertices(surface, mesh, inside[:, None])[..., 0] > 0.5)
     colours, share = np.zeros_like(seen.colours), np.zeros_like(seen.confidence)
-    everything = [(skin & ~inner, seen, _SKIN_REACH_MM), (inner, narrow, _REACH_MM)]
-    everything += [(parts_of(surface, mesh, name), narrow, _REACH_MM) for name in _PARTS]
-    for texels, blend, reach_mm in everything:
-        colours[texels], share[texels] = _spread(blend, texels, reach_mm / surface.texel_mm)
     outer = skin & ~inner
+    for texels in (outer, inner, *(parts_of(surface, mesh, name) for name in _PARTS)):
+        colours[texels], share[texels] = _spread(seen, texels, _REACH_MM / surface.texel_mm)
     share[outer] *= _ramp(seen, outer, surface)[outer]
     share *= mask
-    known = np.where(outer, seen.confidence, narrow.confidence)
-    return ExpressionLook(colours, share.astype(np.float32), known, gains)
+    return ExpressionLook(colours, share.astype(np.float32), seen.confidence, gains)
 
 
 def _enlarged(camera: Camera, photo: UInt8[Array, "h w 3"]) -> tuple[Camera, UInt8[Array, "h w 3"]]:

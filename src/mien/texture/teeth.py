@@ -20,7 +20,7 @@ _CROWN_MM = 12.0
 """From the biting edge to the gum."""
 _ENAMEL, _GUM = (226.0, 212.0, 190.0), (152.0, 86.0, 80.0)
 _GAP_MM, _GAP_DEPTH = 0.7, 0.5
-_FAR_MM, _FAR_LIGHT = 45.0, 0.5
+_FAR_MM, _FAR_LIGHT = 32.0, 0.25
 """Teeth so far behind the foremost get so little light."""
 
 
