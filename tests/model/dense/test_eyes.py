@@ -30,8 +30,24 @@ def test_a_ball_that_stands_out_goes_back() -> None:
     away = np.linalg.norm((seated - VERTICES)[BALL].mean(axis=0))
     assert away < 0.5 * np.linalg.norm([0.5, 0.0, 2.5])
     assert inside_mm(seated) < max(inside_mm(VERTICES), 0.1) + 0.3
-    # As a whole: it stays as round as it was.
-    np.testing.assert_allclose(np.ptp((seated - out)[BALL], axis=0), 0, atol=1e-9)
+    # As a whole: it stays as round as it was, whatever its size.
+    shape, before = (
+        vertices[BALL] - vertices[BALL].mean(axis=0) for vertices in (seated, VERTICES)
+    )
+    scale = np.linalg.norm(shape) / np.linalg.norm(before)
+    np.testing.assert_allclose(shape, scale * before, atol=1e-9)
+
+
+def test_lids_farther_apart_have_a_larger_ball_between_them() -> None:
+    centre = VERTICES[BALL].mean(axis=0)
+    wide = VERTICES.copy()
+    near = SKIN[np.linalg.norm(VERTICES[SKIN] - centre, axis=1) < 25]
+    wide[near] = centre + 1.1 * (VERTICES[near] - centre)
+    seated = seat_eyes(wide, GENERIC)
+    grown = np.linalg.norm(seated[BALL] - seated[BALL].mean(axis=0)) / np.linalg.norm(
+        VERTICES[BALL] - centre
+    )
+    assert 1.01 < grown < 1.12
 
 
 def test_lids_that_sink_in_are_lifted_out() -> None:

@@ -33,7 +33,10 @@ def seat_eyes(vertices: Float[Array, "v 3"], generic: GenericHead) -> Float[Arra
         lids, gap = _lids(ball, generic)
         shape = generic.mesh.vertices[ball] - generic.mesh.vertices[ball].mean(axis=0)
         usual = float(np.linalg.norm(shape, axis=1).max())
-        centre, radius = _seat(vertices[lids], gap, vertices[ball].mean(axis=0), usual)
+        # Lids that are a little inside the generic ball say nothing of its place.
+        outside = gap > 0
+        start = vertices[ball].mean(axis=0)
+        centre, radius = _seat(vertices[lids[outside]], gap[outside], start, usual)
         result[ball] = centre + radius / usual * shape
         result[lids] = _lifted(vertices[lids], gap, centre, radius)
     return result
