@@ -11,7 +11,7 @@ import pytest
 
 from mien.arrays import Array
 from mien.assets.generic import load_generic_head
-from mien.build import Build, BuildOptions, build_head
+from mien.build import Build, build_head
 from mien.camera import Camera
 from mien.expressions.regions import MASKS, default_masks
 from mien.expressions.rig import Rig
@@ -51,7 +51,7 @@ def filmed(request: pytest.FixtureRequest, shared: Path) -> Filmed:
     clip = shared / "data" / "videos" / f"{request.param}.mp4"
     if not clip.is_file():
         pytest.skip(f"no {clip.name} in ../shared/data/videos")
-    build = build_head(clip, options=BuildOptions(texture_size=1024))
+    build = build_head(clip)
     rig = Rig(build.head)
     photos = {view.photo.name: view.photo.pixels for view in build.capture.views}
     return Filmed(build, rig, MorphRenderer(build.head.mesh, rig.textures), photos)
