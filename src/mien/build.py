@@ -115,16 +115,17 @@ def build_head(
     capture = _named_by_expression(capture)
     if NEUTRAL not in capture.expressions:
         raise EstimationError(f"{source}: there is no folder called {NEUTRAL} among its folders")
-    capture, fits = _fit_all(capture, generic, options, tell)
-    head = _head(capture, fits, generic)
+    capture, fits, units = _fit_all(capture, generic, options, tell)
+    head = _head(capture, fits, units, generic)
     head, coverage = _with_textures(head, capture, options, tell)
     return Build(head, capture, fits, coverage)
 
 
 def _fit_all(
     capture: Capture, generic: GenericHead, options: BuildOptions, tell: Progress
-) -> tuple[Capture, dict[str, Fit | ExpressionFit]]:
-    """Neutral by itself, then each expression with neutral as what is known.
+) -> tuple[Capture, dict[str, Fit | ExpressionFit], Float[Array, "52 v 3"]]:
+    """Neutral by itself, then each expression with neutral and its face units as what is known;
+    gives the units, too.
 
     An expression that cannot be fitted is left out of the capture, with a note.
     """
@@ -154,7 +155,7 @@ def _fit_all(
         fits[name] = replace(fit, vertices=contacts.resolved(fit.vertices))
     tell(SOLVING, count, count)
     fitted = {name: capture.expressions[name] for name in fits}
-    return replace(capture, expressions=fitted, notes=(*capture.notes, *notes)), fits
+    return replace(capture, expressions=fitted, notes=(*capture.notes, *notes)), fits, units
 
 
 def _named_by_expression(capture: Capture) -> Capture:
@@ -171,7 +172,12 @@ def _named_by_expression(capture: Capture) -> Capture:
     return replace(capture, expressions=expressions)
 
 
-def _head(capture: Capture, fits: Mapping[str, Fit | ExpressionFit], generic: GenericHead) -> Head:
+def _head(
+    capture: Capture,
+    fits: Mapping[str, Fit | ExpressionFit],
+    units: Float[Array, "52 v 3"],
+    generic: GenericHead,
+) -> Head:
     neutral = fits[NEUTRAL]
     assert isinstance(neutral, Fit)
     return Head(
@@ -180,7 +186,7 @@ def _head(capture: Capture, fits: Mapping[str, Fit | ExpressionFit], generic: Ge
         expressions={name: _expression(name, fit, generic) for name, fit in fits.items()},
         uncertainty_mm=neutral.uncertainty_mm,
         unit_names=generic.unit_names,
-        unit_offsets=fit_units(generic, neutral.vertices),
+        unit_offsets=units,
         regions=default_masks(generic),
         left_out={photo: why for fit in fits.values() for photo, why in fit.left_out.items()},
     )

@@ -11,7 +11,6 @@ from mien.expressions.state import PosedFace
 from mien.mesh import Mesh
 from mien.numeric.raster import interpolate
 from mien.render.morph import MorphRenderer
-from mien.render.projection import enlarged
 from mien.render.shade import rasterize_mesh, render
 from shapes import camera_at, ellipsoid, with_nose
 
@@ -53,7 +52,7 @@ def passes(posed: PosedFace, camera: Camera, factor: int) -> Array:
     Returns: (H, W, 4), not rounded; NaN where a pixel is not wholly covered.
     """
     mesh = MESH.with_vertices(posed.vertices)
-    raster = rasterize_mesh(mesh, enlarged(camera, factor))
+    raster = rasterize_mesh(mesh, camera.resized(factor))
     corners = np.concatenate([mesh.uvs, np.zeros((1, 2))])[mesh.uv_triangles[raster.triangle_ids]]
     uv = np.einsum("hwk,hwkc->hwc", raster.barycentrics, corners)
     shares = interpolate(raster, mesh.triangles, posed.weights)

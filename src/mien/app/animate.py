@@ -18,15 +18,13 @@ from mien.expressions.state import FaceState
 from mien.formats.timeline_check import check_timeline
 from mien.formats.timeline_file import load_performance
 from mien.model.head import NEUTRAL, Head
-from mien.render.picture import HeadRenderer
+from mien.render.picture import GREY, HeadRenderer
 
 if TYPE_CHECKING:
     from mien.build import Progress
 
 SIZE = (720, 900)
 """Of pictures, px, unless the timeline or the user says."""
-GREY = (72, 74, 84)
-"""Behind the head where a video has no alpha."""
 STAGE = "Animating"
 
 

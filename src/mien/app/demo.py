@@ -17,7 +17,7 @@ from mien.formats.export import export_head
 from mien.formats.head_folder import is_head_folder
 from mien.formats.image import save_image
 from mien.model.head import Head
-from mien.render.picture import HeadRenderer, render_head
+from mien.render.picture import GREY, HeadRenderer, render_head
 
 
 class _Look(TypedDict):
@@ -37,7 +37,7 @@ UNITS = {
     "blink": {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0},
     "brows up": {"browInnerUp": 1.0, "browOuterUpLeft": 0.8, "browOuterUpRight": 0.8},
 }
-_LOOK = _Look(size=(480, 600), background=(72, 74, 84))
+_LOOK = _Look(size=(480, 600), background=GREY)
 PERFORMANCE = "performance.mp4"
 _FPS = 25
 _STAGE = "Rendering and exporting"

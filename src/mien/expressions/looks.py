@@ -91,29 +91,35 @@ def paint_expressions(
     height, width = base.shape[:2]
     surface = atlas_surface(mesh, width=width, height=height)
     looks = {
-        name: _look(mesh.with_vertices(item.vertices), item, name, base, generic)
-        for name, item in photographed.items()
+        name: _look(mesh, surface, item, name, base, generic) for name, item in photographed.items()
     }
+    texels = {part: parts_of(surface, mesh, part) for part in _GROUPS}
     openings = Openings.of(generic, mesh.vertices)
     opened = {name: openings.measure(item.vertices) for name, item in photographed.items()}
-    shading = _fit_shading(surface, mesh, looks, opened)
+    shading = _fit_shading(texels, looks, opened)
     light = {name: brightness_at(at, shading) for name, at in opened.items()}
-    common = _common_parts(surface, mesh, looks, light, base, generic)
+    common = _common_parts(surface, mesh, texels, looks, light, base, generic)
     textures = {}
     for name, look in looks.items():
         below = base.astype(np.float32)
         for part, (column, _) in _GROUPS.items():
-            texels = parts_of(surface, mesh, part)
-            below[texels] = common[texels] * light[name][column]
+            below[texels[part]] = common[texels[part]] * light[name][column]
         textures[name] = look.over(below, surface)
     return Looks(textures, shading, {name: look.gains for name, look in looks.items()})
 
 
 def _look(
-    mesh: Mesh, item: Photographed, name: str, base: UInt8[Array, "h w 3"], generic: GenericHead
+    neutral: Mesh,
+    surface: SurfaceMap,
+    item: Photographed,
+    name: str,
+    base: UInt8[Array, "h w 3"],
+    generic: GenericHead,
 ) -> ExpressionLook:
-    height, width = base.shape[:2]
-    surface = atlas_surface(mesh, width=width, height=height)
+    mesh = neutral.with_vertices(item.vertices)
+    if name != NEUTRAL:
+        height, width = base.shape[:2]
+        surface = atlas_surface(mesh, width=width, height=height)
     inside = np.maximum(generic.regions["mouth_cavity"], generic.regions["eye_socket"])
 
     def seen_by(views: Sequence[int], within: Float[Array, " v"]) -> ExpressionLook:
@@ -144,18 +150,18 @@ def _slits(mesh: Mesh, generic: GenericHead) -> list[tuple[Int[Array, " n"], Flo
     """Vertices along each eye's lids and along the lips, and (V,) masks of their surroundings."""
     from scipy.spatial import cKDTree
 
-    slits = []
     masks = default_masks(generic)
-    whole = {"mouth": masks["left_mouth"] + masks["right_mouth"]}
-    for region in ("left_eye", "right_eye", "mouth"):
-        side = region.removesuffix("_eye")
-        names = ("upper_lip_inner", "lower_lip_inner")
-        if region != "mouth":
-            names = (f"{side}_upper_eyelid", f"{side}_lower_eyelid")
+    regions = {
+        ("left_upper_eyelid", "left_lower_eyelid"): masks["left_eye"],
+        ("right_upper_eyelid", "right_lower_eyelid"): masks["right_eye"],
+        ("upper_lip_inner", "lower_lip_inner"): masks["left_mouth"] + masks["right_mouth"],
+    }
+    slits = []
+    for names, mask in regions.items():
         lines = np.array([vertex for name in names for vertex in generic.polylines[name]])
         distance = cKDTree(mesh.vertices[lines]).query(mesh.vertices)[0]
         near = np.clip((_AROUND_MM[1] - distance) / (_AROUND_MM[1] - _AROUND_MM[0]), 0, 1)
-        slits.append((lines, near * whole.get(region, masks.get(region, near))))
+        slits.append((lines, near * mask))
     return slits
 
 
@@ -173,18 +179,16 @@ def _best_view(mesh: Mesh, around: Int[Array, " n"], cameras: Sequence[Camera]) 
 
 
 def _fit_shading(
-    surface: SurfaceMap,
-    mesh: Mesh,
+    texels: Mapping[str, Bool[Array, "h w"]],
     looks: Mapping[str, ExpressionLook],
     opened: Mapping[str, Float[Array, " 3"]],
 ) -> dict[str, Polynomial]:
     """From how bright the expressions show the same texels."""
     measured: dict[str, list[tuple[float, float, float]]] = {EYES: [], TEETH: []}
     for part, (column, kind) in _GROUPS.items():
-        texels = parts_of(surface, mesh, part)
-        most = _by_seen(looks, texels)[-1]
+        most = _by_seen(looks, texels[part])[-1]
         for name, look in looks.items():
-            ratio = _ratio(look, looks[most], texels)
+            ratio = _ratio(look, looks[most], texels[part])
             if name != most and ratio is not None:
                 pair = float(opened[name][column]), float(opened[most][column])
                 measured[kind].append((*pair, ratio))
@@ -214,6 +218,7 @@ def _ratio(look: ExpressionLook, other: ExpressionLook, texels: Bool[Array, "h w
 def _common_parts(
     surface: SurfaceMap,
     mesh: Mesh,
+    texels: Mapping[str, Bool[Array, "h w"]],
     looks: Mapping[str, ExpressionLook],
     light: Mapping[str, Float[Array, " 3"]],
     base: UInt8[Array, "h w 3"],
@@ -224,17 +229,17 @@ def _common_parts(
     that is on the skin."""
     common = base.astype(np.float32)
     tint = _tint(surface, mesh, base)
+    places = over_vertices(surface, mesh, generic.mesh.vertices)
     for part, (column, _) in _GROUPS.items():
-        texels = parts_of(surface, mesh, part)
-        colours = common[texels] / light[NEUTRAL][column]
+        inside = texels[part]
+        colours = common[inside] / light[NEUTRAL][column]
         if part.endswith("teeth"):
-            points = over_vertices(surface, mesh, generic.mesh.vertices)
-            colours = usual_teeth(points[texels], part)
+            colours = usual_teeth(places[inside], part)
         if column == _MOUTH:
             colours *= tint
-        for name in _by_seen(looks, texels):
-            share = looks[name].share[texels][:, None]
-            own = looks[name].colours[texels] / light[name][column]
+        for name in _by_seen(looks, inside):
+            share = looks[name].share[inside][:, None]
+            own = looks[name].colours[inside] / light[name][column]
             colours += share * (own - colours)
-        common[texels] = colours
+        common[inside] = colours
     return common

@@ -20,7 +20,7 @@ from mien.render.mipmap import (
     texel_areas,
     weighted_texels,
 )
-from mien.render.projection import enlarged, project_safely
+from mien.render.projection import project_safely
 
 
 class Painted(NamedTuple):
@@ -76,7 +76,7 @@ def draw_mix(
 
     Edges get factor x factor samples a pixel; a triangle is looked up once in each pixel.
     """
-    large = enlarged(camera, factor)
+    large = camera.resized(factor)
     points, depth = project_safely(vertices, large), large.to_camera(vertices)[:, 2]
     coverage = prepare_coverage(points, depth, painted.triangles, large.width, large.height)
     surface = _surface(painted, points, weights, brightness, factor)

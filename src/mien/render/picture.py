@@ -16,6 +16,9 @@ from mien.model.head import Head
 from mien.render.morph import MorphRenderer
 from mien.render.orbit import orbit_camera, turntable
 
+GREY = (72, 74, 84)
+"""Behind a head where a picture is to have no alpha."""
+
 
 class HeadRenderer:
     """Draws one head in any state; what all its pictures share is prepared once.
@@ -100,7 +103,7 @@ def turntable_frames(
     *,
     frames: int = 72,
     size: tuple[int, int] = (400, 500),
-    background: tuple[int, int, int] = (72, 74, 84),
+    background: tuple[int, int, int] = GREY,
 ) -> Iterator[UInt8[Array, "h w 3"]]:
     """The head once around, one picture at a time."""
     renderer, (width, height) = HeadRenderer(head), size

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mien.arrays import Array, Float
@@ -18,19 +16,6 @@ def samples_across(samples: int) -> int:
     if samples not in SAMPLES:
         raise InputError("samples", " or ".join(map(str, SAMPLES)), samples)
     return int(np.sqrt(samples))
-
-
-def enlarged(camera: Camera, factor: int) -> Camera:
-    """The same view on an image with factor x factor as many pixels."""
-    if factor == 1:
-        return camera
-    return replace(
-        camera,
-        width=camera.width * factor,
-        height=camera.height * factor,
-        focal_px=camera.focal_px * factor,
-        principal_px=camera.principal * factor,
-    )
 
 
 def project_safely(vertices: Float[Array, "v 3"], camera: Camera) -> Float[Array, "v 2"]:

@@ -15,7 +15,7 @@ from mien.numeric.raster import Raster, interpolate, rasterize
 from mien.numeric.threads import for_row_bands
 from mien.render.mipmap import build_pyramids
 from mien.render.mix import draw_mix, prepare_painted
-from mien.render.projection import enlarged, project_safely, samples_across
+from mien.render.projection import project_safely, samples_across
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def _textured(
 def _coloured(
     mesh: Mesh, camera: Camera, vertex_colours: Array | None, light: Light | None, factor: int
 ) -> UInt8[Array, "h w 4"]:
-    raster = rasterize_mesh(mesh, enlarged(camera, factor))
+    raster = rasterize_mesh(mesh, camera.resized(factor))
     if vertex_colours is not None:
         values = check_array("vertex_colours", vertex_colours, (len(mesh.vertices), 3))
         colours = interpolate(raster, mesh.triangles, values)

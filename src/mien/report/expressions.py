@@ -12,9 +12,9 @@ from mien.assets.generic import load_generic_head
 from mien.camera import Camera
 from mien.expressions.state import FACE, FaceState
 from mien.model.head import NEUTRAL, FittedView, Head
-from mien.render.picture import HeadRenderer
+from mien.render.picture import GREY, HeadRenderer
 from mien.render.shade import over_background, render
-from mien.report.pictures import BACKGROUND, data_uri
+from mien.report.pictures import data_uri
 
 MIXTURES = {
     "half of it": {FACE: 0.5},
@@ -77,7 +77,7 @@ def _row(
     psnr, picture = face_psnr(renderer, name, view, photo)
     box = _box(picture[..., 3] > 0)
     factor = min(1.0, _HEIGHT / (box[0].stop - box[0].start))
-    shown = {view.photo: photo, "mien": over_background(picture, BACKGROUND)[..., :3]}
+    shown = {view.photo: photo, "mien": over_background(picture, GREY)[..., :3]}
     pictures = {caption: _small(image[box], factor) for caption, image in shown.items()}
     if name != NEUTRAL:
         camera = view.camera.resized(factor)
@@ -96,7 +96,7 @@ def _mixtures(
     pictures = {}
     for caption, regions in MIXTURES.items():
         state = FaceState({region: {name: weight} for region, weight in regions.items()})
-        pictures[caption] = renderer.draw(state, camera, background=BACKGROUND)[..., :3]
+        pictures[caption] = renderer.draw(state, camera, background=GREY)[..., :3]
     return pictures
 
 

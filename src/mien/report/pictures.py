@@ -13,6 +13,7 @@ from mien.model.head import ATLAS, Head
 from mien.model.verdict import PhotoFit
 from mien.render.orbit import orbit_camera
 from mien.render.overlay import overlay_mesh
+from mien.render.picture import GREY
 from mien.render.shade import render
 
 PREVIEWS = {"front": 0, "left": 45, "left side": 90, "back": 180, "right side": -90, "right": -45}
@@ -21,7 +22,6 @@ UNCERTAINTY_LIMITS_MM = (1.0, 10.0)
 """What the brightest and the darkest colour of the uncertainty stand for."""
 _DARK, _BRIGHT = np.array([60.0, 30.0, 80.0]), np.array([250.0, 220.0, 60.0])
 _SIZE = (360, 450)
-BACKGROUND = (72, 74, 84)
 _PHOTO_HEIGHT = 900
 _USED, _DISTRUSTED = (60, 230, 90), (240, 60, 50)
 
@@ -84,7 +84,7 @@ def _seen_from(
         texture,
         vertex_colours=vertex_colours,
         samples=4,
-        background=BACKGROUND,
+        background=GREY,
     )
     return {"source": data_uri(image[..., :3]), "caption": name}
 
