@@ -13,8 +13,8 @@ from mien.capture import source
 from mien.capture.annotations import AnnotationNames
 from mien.capture.detector import NO_FACE
 from mien.capture.photos import Photo
+from mien.capture.picked_frames import PickedFrames
 from mien.capture.source import TO_BE_PLACED, load_capture
-from mien.capture.video import PickedFrames
 from mien.errors import EstimationError, FileFormatError, InputError
 
 JAMES = Path(mien.assets.__file__).parent / "data" / "james"

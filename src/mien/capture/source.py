@@ -21,7 +21,8 @@ from mien.capture.folder import (
 from mien.capture.landmarks import Landmarks
 from mien.capture.mediapipe_face import yaw_pitch
 from mien.capture.photos import MAX_SIDE, Photo, load_photo
-from mien.capture.video import VIDEO_SUFFIXES, pick_frames
+from mien.capture.picked_frames import pick_frames
+from mien.capture.video import VIDEO_SUFFIXES
 from mien.errors import EstimationError
 
 Progress = Callable[[int, int], None]

@@ -1,23 +1,19 @@
-"""Frames of a video, upright, and the choice of those that serve as photos."""
+"""Frames of a video, upright and in order."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Generator
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mien.arrays import Array, Int, UInt8, check_positive
-from mien.capture.detector import LandmarkDetector
-from mien.capture.expression_choice import choose_expressions, name_expressions
+from mien.arrays import Array, UInt8
 from mien.capture.files import check_readable, kind_of, one_line
-from mien.capture.folder import NEUTRAL
-from mien.capture.frame_choice import FrameScores, choose_frames
-from mien.capture.mediapipe_face import DetectedFace, yaw_pitch
-from mien.capture.photos import MAX_PIXELS, MAX_SIDE, Photo, shrunk
-from mien.errors import EstimationError, FileFormatError
+from mien.capture.photos import MAX_PIXELS
+from mien.errors import FileFormatError
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -26,13 +22,8 @@ if TYPE_CHECKING:
 
 VIDEO_SUFFIXES = frozenset((".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mts", ".3gp"))
 
-MAX_SAMPLES = 240
-# Just under a tenth, so that rounded times of a 10 Hz clip do not skip frames.
-_SAMPLE_SECONDS = 0.099
-_ANALYSIS_SIDE = 640
-_SHARPNESS_SIDE = 192
-_BLOCK = 8
 _USUAL_RATE = 25
+_PER_SECOND = 1e6  # FFmpeg's unit of a container's times
 _PQ, _HLG = 16, 18
 
 
@@ -57,12 +48,53 @@ class Frame:
         """Coded for a brighter range than sRGB's, which shifts its colours here."""
         return self.raw.color_trc in (_PQ, _HLG)
 
-    def pixels(self) -> UInt8[Array, "h w 3"]:
-        """(H, W, 3) sRGB with square pixels, the container's rotation flag applied."""
-        width = max(1, round(self.raw.width * self.pixel_aspect))
-        stored = self.raw.to_ndarray(format="rgb24", width=width, height=self.raw.height)
-        # The flag counts degrees counterclockwise, as numpy does quarter turns.
-        return np.ascontiguousarray(np.rot90(stored, round(self.raw.rotation / 90)))
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of its pixels, px."""
+        width, height = self._stored_size(None)
+        return (height, width) if self._quarters % 2 else (width, height)
+
+    def pixels(self, *, max_side: int | None = None) -> UInt8[Array, "h w 3"]:
+        """(H, W, 3) sRGB with square pixels, the container's rotation flag applied.
+
+        Args:
+            max_side: px; a picture whose longer side is longer is reduced to it by averaging while
+                its colours are converted, which takes less than doing one after the other.
+        """
+        width, height = self._stored_size(max_side)
+        # The scaler's quickest way, "FAST_BILINEAR", shifts pictures by most of a pixel.
+        how = "BILINEAR" if height == self.raw.height else "AREA"
+        stored = self.raw.to_ndarray(format="rgb24", width=width, height=height, interpolation=how)
+        return np.ascontiguousarray(np.rot90(stored, self._quarters))
+
+    @property
+    def _quarters(self) -> int:
+        """Turns to make it upright, counterclockwise as the flag and numpy count."""
+        return round(self.raw.rotation / 90)
+
+    def _stored_size(self, max_side: int | None) -> tuple[int, int]:
+        """Width and height before it is turned, at most so long."""
+        width, height = max(1, round(self.raw.width * self.pixel_aspect)), self.raw.height
+        factor = min(1.0, (max_side or np.inf) / max(width, height))
+        return max(1, round(width * factor)), max(1, round(height * factor))
+
+
+@dataclass(frozen=True)
+class VideoFacts:
+    """What a file states of its pictures, and its first one shows.
+
+    Attributes:
+        width, height: upright, px.
+        fps: frames a second, their mean where it varies.
+        frames: how many; 0: unknown.
+        seconds: how long; None: unknown.
+    """
+
+    width: int
+    height: int
+    fps: float
+    frames: int
+    seconds: float | None
 
 
 @dataclass
@@ -77,7 +109,7 @@ class Video:
     path: Path
     notes: list[str] = field(default_factory=list)
 
-    def frames(self) -> Iterator[Frame]:
+    def frames(self) -> Generator[Frame]:
         """Every frame in order of display. A stream that breaks half-way ends there, with a note.
 
         Raises: InputError, FileFormatError: not a video, no frames, too large.
@@ -89,10 +121,14 @@ class Video:
             stream = self._stream(container)
             aspect = float(stream.sample_aspect_ratio or 1)
             rate = float(stream.average_rate or _USUAL_RATE)
+            begin = (container.start_time or 0) / _PER_SECOND
             try:
                 for raw in container.decode(stream):
-                    seconds = count / rate if raw.time is None else raw.time
-                    yield Frame(count, seconds, aspect, raw)
+                    seconds = count / rate if raw.time is None else raw.time - begin
+                    frame = Frame(count, seconds, aspect, raw)
+                    if frame.hdr:
+                        self._note("HDR video: its colours are approximate")
+                    yield frame
                     count += 1
             except av.FFmpegError as error:
                 reason = one_line(error.strerror or error)
@@ -103,13 +139,16 @@ class Video:
         if not count:
             raise FileFormatError(self.path, "expected a video, found no frame that can be read")
 
-    def length(self) -> tuple[int, float | None]:
-        """Number of frames (0: unknown) and seconds (None: unknown), as the file states them."""
+    def facts(self) -> VideoFacts:
+        """Size, rate and length. Raises: as `frames`."""
+        with closing(self.frames()) as frames:
+            width, height = next(frames).size
         with self._opened() as container:
             stream = self._stream(container)
             rate = float(stream.average_rate or _USUAL_RATE)
-            seconds = container.duration / 1e6 if container.duration else None
-            return stream.frames or _frames_in(container, rate), seconds
+            seconds = container.duration / _PER_SECOND if container.duration else None
+            count = stream.frames or _frames_in(container, rate)
+            return VideoFacts(width, height, rate, count, seconds)
 
     def _note(self, note: str) -> None:
         if note not in self.notes:
@@ -139,168 +178,4 @@ class Video:
 
 def _frames_in(container: InputContainer, rate: float) -> int:
     """As the stated length tells; 0 when there is none."""
-    return round(container.duration / 1e6 * rate) if container.duration else 0
-
-
-@dataclass(frozen=True)
-class PickedFrames:
-    """What a clip gives for a head.
-
-    Attributes:
-        expressions: photos by expression, "neutral" first. Photos are called `frame_000123.png` by
-            the frame's number from 0.
-        notes: what was odd.
-    """
-
-    expressions: dict[str, tuple[Photo, ...]]
-    notes: tuple[str, ...]
-
-
-def pick_frames(
-    path: str | Path,
-    *,
-    count: int = 7,
-    expressions: int | None = None,
-    detector: LandmarkDetector,
-    max_side: int = MAX_SIDE,
-    progress: Callable[[int, int], None] | None = None,
-) -> PickedFrames:
-    """Sharp frames with diverse poses of the head at rest, and one of each other expression.
-
-    The clip is decoded twice: once to judge up to 240 frames (10 a second at most), once to fetch
-    the chosen ones, so that memory stays small however long and large it is.
-
-    Args:
-        count: of neutral as many at most; fewer when the head turns little.
-        expressions: as many others at most; None takes what differs, up to 8; 0 neutral alone.
-        progress: told (done, total) frames of both passes; the total is an estimate.
-    Raises:
-        InputError: no such file, not readable, `count` not positive.
-        FileFormatError: not a video, or no frame in it.
-        EstimationError: no face in any frame.
-    """
-    check_positive("count", count)
-    video = Video(Path(path))
-    report = _two_passes(progress, video.length()[0])
-    scores = _judge(video, detector, report)
-    rows = _choose_rows(scores, count, expressions)
-    wanted = {int(scores.index[row]) for chosen in rows.values() for row in chosen}
-    photos = dict(_fetch(video, wanted, max_side, report))
-    picked = {
-        name: tuple(photos[index] for index in scores.index[chosen].tolist() if index in photos)
-        for name, chosen in rows.items()
-    }
-    neutral = rows[NEUTRAL]
-    span = f"the head turns by {np.degrees(np.ptp(scores.pose[neutral, 0])):.0f} degrees in them"
-    video.notes.append(f"{len(neutral)} of {len(scores.index)} judged frames chosen: {span}")
-    others = [name for name in rows if name != NEUTRAL]
-    if others:
-        video.notes.append(f"{len(others)} other expressions chosen: {', '.join(others)}")
-    return PickedFrames(picked, tuple(video.notes))
-
-
-def _choose_rows(
-    scores: FrameScores, count: int, expressions: int | None
-) -> dict[str, Int[Array, " n"]]:
-    """Rows of the scores by expression."""
-    neutral = choose_frames(scores, count)
-    at_rest = int(neutral[np.abs(scores.pose[neutral]).sum(axis=1).argmin()])
-    others = choose_expressions(scores, at_rest, expressions)
-    names = name_expressions(scores.blendshapes[others], scores.blendshapes[at_rest])
-    return {NEUTRAL: neutral} | {
-        name: np.array([row]) for name, row in zip(names, others, strict=True)
-    }
-
-
-def _two_passes(
-    progress: Callable[[int, int], None] | None, frames: int
-) -> Callable[[int, int], None]:
-    """Progress of pass 0 or 1 at a frame as (done, total) of both."""
-    if progress is None:
-        return lambda step, frame: None
-
-    def report(step: int, frame: int) -> None:
-        total = 2 * max(frames, frame + 1)
-        progress(min(step * total // 2 + frame + 1, total), total)
-
-    return report
-
-
-def _judge(
-    video: Video, detector: LandmarkDetector, report: Callable[[int, int], None]
-) -> FrameScores:
-    """Scores of the frames, evenly spread in time, that show a face."""
-    seconds = video.length()[1]
-    step = max(_SAMPLE_SECONDS, (seconds or 0) / MAX_SAMPLES)
-    rows: list[tuple[int, float, DetectedFace]] = []
-    due = -np.inf
-    for frame in video.frames():
-        report(0, frame.index)
-        if frame.index == 0 and frame.hdr:
-            video.notes.append("HDR video: its colours are approximate")
-        # A clock that jumps back (a joined clip) must not end the sampling.
-        if due - 2 * step < frame.seconds < due:
-            continue
-        due = frame.seconds + step
-        pixels = frame.pixels()
-        found = detector.detect_fast(shrunk(pixels, _ANALYSIS_SIDE))
-        if found is not None:
-            rows.append((frame.index, _sharpness(pixels, found), found))
-    if not rows:
-        raise EstimationError(f"{video.path}: no face found in any of its frames")
-    faces = [face for _, _, face in rows]
-    return FrameScores(
-        np.array([index for index, _, _ in rows]),
-        np.array([sharpness for _, sharpness, _ in rows]),
-        np.array([yaw_pitch(face.R_cam_head) for face in faces]),
-        np.array([face.blendshapes for face in faces]),
-        np.array([face.lips_apart for face in faces]),
-    )
-
-
-def _sharpness(pixels: UInt8[Array, "h w 3"], face: DetectedFace) -> float:
-    """Variance of the Laplacian over the face, at one size for all and free of contrast, less where
-    the edges are those of the coder's blocks."""
-    import cv2
-
-    factor = max(pixels.shape) / min(max(pixels.shape), _ANALYSIS_SIDE)
-    low = np.maximum(face.points[:, :2].min(axis=0) * factor, 0).astype(int)
-    high = np.ceil(face.points[:, :2].max(axis=0) * factor).astype(int)
-    crop = shrunk(pixels[low[1] : high[1], low[0] : high[0]], _SHARPNESS_SIDE)
-    if crop.size == 0:
-        return 0.0
-    grey = cv2.cvtColor(np.ascontiguousarray(crop), cv2.COLOR_RGB2GRAY).astype(np.float64)
-    sharpness = float(cv2.Laplacian(grey, cv2.CV_64F).var() / (grey.var() + 1.0))
-    return sharpness / _blockiness(pixels) ** 2
-
-
-def _blockiness(pixels: UInt8[Array, "h w 3"]) -> float:
-    """How much larger steps are at the borders of 8x8 blocks than inside: 1 where none shows.
-
-    The first frames of a clip are often coded so coarsely that blocks are most of what they show.
-    """
-    grey = pixels[..., 1].astype(np.float32)
-    ratios = []
-    for image in (grey, grey.T):
-        steps = np.abs(np.diff(image, axis=1)).mean(axis=0)
-        border = np.arange(len(steps)) % _BLOCK == _BLOCK - 1
-        if border.any():
-            ratios.append(float(steps[border].mean() / max(float(steps[~border].mean()), 1e-3)))
-    return max(1.0, float(np.mean(ratios or [1.0])))
-
-
-def _fetch(
-    video: Video, wanted: set[int], max_side: int, report: Callable[[int, int], None]
-) -> Iterator[tuple[int, Photo]]:
-    """The wanted frames as photos, with their numbers."""
-    last = max(wanted)
-    for frame in video.frames():
-        report(1, frame.index)
-        if frame.index in wanted:
-            pixels = frame.pixels()
-            size = pixels.shape[1], pixels.shape[0]
-            name = f"frame_{frame.index:06d}.png"
-            photo = Photo(name, video.path, shrunk(pixels, max_side), original_size=size)
-            yield frame.index, photo
-        if frame.index == last:
-            return
+    return round(container.duration / _PER_SECOND * rate) if container.duration else 0

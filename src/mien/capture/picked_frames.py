@@ -1,0 +1,187 @@
+"""The frames of a video that serve as photos."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mien.arrays import Array, Int, UInt8, check_positive
+from mien.capture.detector import LandmarkDetector
+from mien.capture.expression_choice import choose_expressions, name_expressions
+from mien.capture.folder import NEUTRAL
+from mien.capture.frame_choice import FrameScores, choose_frames
+from mien.capture.mediapipe_face import DetectedFace, yaw_pitch
+from mien.capture.photos import MAX_SIDE, Photo, shrunk
+from mien.capture.video import Video
+from mien.errors import EstimationError
+
+MAX_SAMPLES = 240
+# Just under a tenth, so that rounded times of a 10 Hz clip do not skip frames.
+_SAMPLE_SECONDS = 0.099
+_ANALYSIS_SIDE = 640
+_SHARPNESS_SIDE = 192
+_BLOCK = 8
+
+
+@dataclass(frozen=True)
+class PickedFrames:
+    """What a clip gives for a head.
+
+    Attributes:
+        expressions: photos by expression, "neutral" first. Photos are called `frame_000123.png` by
+            the frame's number from 0.
+        notes: what was odd.
+    """
+
+    expressions: dict[str, tuple[Photo, ...]]
+    notes: tuple[str, ...]
+
+
+def pick_frames(
+    path: str | Path,
+    *,
+    count: int = 7,
+    expressions: int | None = None,
+    detector: LandmarkDetector,
+    max_side: int = MAX_SIDE,
+    progress: Callable[[int, int], None] | None = None,
+) -> PickedFrames:
+    """Sharp frames with diverse poses of the head at rest, and one of each other expression.
+
+    The clip is decoded twice: once to judge up to 240 frames (10 a second at most), once to fetch
+    the chosen ones, so that memory stays small however long and large it is.
+
+    Args:
+        count: of neutral as many at most; fewer when the head turns little.
+        expressions: as many others at most; None takes what differs, up to 8; 0 neutral alone.
+        progress: told (done, total) frames of both passes; the total is an estimate.
+    Raises:
+        InputError: no such file, not readable, `count` not positive.
+        FileFormatError: not a video, or no frame in it.
+        EstimationError: no face in any frame.
+    """
+    check_positive("count", count)
+    video = Video(Path(path))
+    report = _two_passes(progress, video.facts().frames)
+    scores = _judge(video, detector, report)
+    rows = _choose_rows(scores, count, expressions)
+    wanted = {int(scores.index[row]) for chosen in rows.values() for row in chosen}
+    photos = dict(_fetch(video, wanted, max_side, report))
+    picked = {
+        name: tuple(photos[index] for index in scores.index[chosen].tolist() if index in photos)
+        for name, chosen in rows.items()
+    }
+    neutral = rows[NEUTRAL]
+    span = f"the head turns by {np.degrees(np.ptp(scores.pose[neutral, 0])):.0f} degrees in them"
+    video.notes.append(f"{len(neutral)} of {len(scores.index)} judged frames chosen: {span}")
+    others = [name for name in rows if name != NEUTRAL]
+    if others:
+        video.notes.append(f"{len(others)} other expressions chosen: {', '.join(others)}")
+    return PickedFrames(picked, tuple(video.notes))
+
+
+def _choose_rows(
+    scores: FrameScores, count: int, expressions: int | None
+) -> dict[str, Int[Array, " n"]]:
+    """Rows of the scores by expression."""
+    neutral = choose_frames(scores, count)
+    at_rest = int(neutral[np.abs(scores.pose[neutral]).sum(axis=1).argmin()])
+    others = choose_expressions(scores, at_rest, expressions)
+    names = name_expressions(scores.blendshapes[others], scores.blendshapes[at_rest])
+    return {NEUTRAL: neutral} | {
+        name: np.array([row]) for name, row in zip(names, others, strict=True)
+    }
+
+
+def _two_passes(
+    progress: Callable[[int, int], None] | None, frames: int
+) -> Callable[[int, int], None]:
+    """Progress of pass 0 or 1 at a frame as (done, total) of both."""
+    if progress is None:
+        return lambda step, frame: None
+
+    def report(step: int, frame: int) -> None:
+        total = 2 * max(frames, frame + 1)
+        progress(min(step * total // 2 + frame + 1, total), total)
+
+    return report
+
+
+def _judge(
+    video: Video, detector: LandmarkDetector, report: Callable[[int, int], None]
+) -> FrameScores:
+    """Scores of the frames, evenly spread in time, that show a face."""
+    step = max(_SAMPLE_SECONDS, (video.facts().seconds or 0) / MAX_SAMPLES)
+    rows: list[tuple[int, float, DetectedFace]] = []
+    due = -np.inf
+    for frame in video.frames():
+        report(0, frame.index)
+        # A clock that jumps back (a joined clip) must not end the sampling.
+        if due - 2 * step < frame.seconds < due:
+            continue
+        due = frame.seconds + step
+        pixels = frame.pixels()
+        found = detector.detect_fast(shrunk(pixels, _ANALYSIS_SIDE))
+        if found is not None:
+            rows.append((frame.index, _sharpness(pixels, found), found))
+    if not rows:
+        raise EstimationError(f"{video.path}: no face found in any of its frames")
+    faces = [face for _, _, face in rows]
+    return FrameScores(
+        np.array([index for index, _, _ in rows]),
+        np.array([sharpness for _, sharpness, _ in rows]),
+        np.array([yaw_pitch(face.R_cam_head) for face in faces]),
+        np.array([face.blendshapes for face in faces]),
+        np.array([face.lips_apart for face in faces]),
+    )
+
+
+def _sharpness(pixels: UInt8[Array, "h w 3"], face: DetectedFace) -> float:
+    """Variance of the Laplacian over the face, at one size for all and free of contrast, less where
+    the edges are those of the coder's blocks."""
+    import cv2
+
+    factor = max(pixels.shape) / min(max(pixels.shape), _ANALYSIS_SIDE)
+    low = np.maximum(face.points[:, :2].min(axis=0) * factor, 0).astype(int)
+    high = np.ceil(face.points[:, :2].max(axis=0) * factor).astype(int)
+    crop = shrunk(pixels[low[1] : high[1], low[0] : high[0]], _SHARPNESS_SIDE)
+    if crop.size == 0:
+        return 0.0
+    grey = cv2.cvtColor(np.ascontiguousarray(crop), cv2.COLOR_RGB2GRAY).astype(np.float64)
+    sharpness = float(cv2.Laplacian(grey, cv2.CV_64F).var() / (grey.var() + 1.0))
+    return sharpness / _blockiness(pixels) ** 2
+
+
+def _blockiness(pixels: UInt8[Array, "h w 3"]) -> float:
+    """How much larger steps are at the borders of 8x8 blocks than inside: 1 where none shows.
+
+    The first frames of a clip are often coded so coarsely that blocks are most of what they show.
+    """
+    grey = pixels[..., 1].astype(np.float32)
+    ratios = []
+    for image in (grey, grey.T):
+        steps = np.abs(np.diff(image, axis=1)).mean(axis=0)
+        border = np.arange(len(steps)) % _BLOCK == _BLOCK - 1
+        if border.any():
+            ratios.append(float(steps[border].mean() / max(float(steps[~border].mean()), 1e-3)))
+    return max(1.0, float(np.mean(ratios or [1.0])))
+
+
+def _fetch(
+    video: Video, wanted: set[int], max_side: int, report: Callable[[int, int], None]
+) -> Iterator[tuple[int, Photo]]:
+    """The wanted frames as photos, with their numbers."""
+    last = max(wanted)
+    for frame in video.frames():
+        report(1, frame.index)
+        if frame.index in wanted:
+            pixels = frame.pixels()
+            size = pixels.shape[1], pixels.shape[0]
+            name = f"frame_{frame.index:06d}.png"
+            photo = Photo(name, video.path, shrunk(pixels, max_side), original_size=size)
+            yield frame.index, photo
+        if frame.index == last:
+            return
