@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +12,8 @@ from mien.animate.channels import head_angles
 from mien.animate.curves import Curve, sampled
 from mien.animate.timeline import Timeline
 from mien.arrays import Array, Float
-from mien.errors import FileFormatError, InputError
+from mien.errors import FileFormatError
+from mien.formats.csv_rows import finite_number, read_rows
 from mien.formats.live_link import COUNT, HEAD_COLUMNS, TIMECODE, TIMECODE_RATE, UNITS
 
 _TIMECODE = re.compile(r"(\d{1,2}):(\d{2}):(\d{2})[:;](\d{1,3}(?:\.\d+)?)", re.ASCII)
@@ -40,7 +38,7 @@ def load_live_link(path: str | Path, *, timecode_rate: float | None = None) -> T
             twice there, a value that is no finite number, times that do not rise, no frame.
     """
     path = Path(path)
-    rows = _read(path)
+    rows = read_rows(path, _HEADER)
     columns = _columns(path, rows[0])
     stamps, values, lines = [], [], []
     for line, row in enumerate(rows[1:], start=2):
@@ -54,19 +52,6 @@ def load_live_link(path: str | Path, *, timecode_rate: float | None = None) -> T
     rate = timecode_rate or _rate(stamps)
     times = _times(path, stamps, lines, rate)
     return _timeline(times, dict(zip(_value_names(columns), np.array(values).T, strict=True)))
-
-
-def _read(path: Path) -> list[list[str]]:
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-        rows = list(csv.reader(io.StringIO(text, newline=""), strict=True))
-    except OSError as error:
-        raise InputError(path, "a readable file", error.strerror or error) from None
-    except (UnicodeDecodeError, csv.Error):
-        raise FileFormatError(path, f"expected {_HEADER}, found other bytes") from None
-    if not rows:
-        raise FileFormatError(path, f"expected {_HEADER}, found an empty file")
-    return rows
 
 
 def _columns(path: Path, header: Sequence[str]) -> dict[str, int]:
@@ -113,15 +98,8 @@ def _stamp(path: Path, line: int, text: str) -> tuple[int, float]:
 
 
 def _number(path: Path, line: int, name: str, row: Sequence[str], columns: dict[str, int]) -> float:
-    text = _cell(row, columns[name.lower()])
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        problem = f"expected a finite number, found {text[:40]!r}"
-        raise FileFormatError(path, problem, f"line {line}, {name[:1].upper()}{name[1:]}")
-    return value
+    place = f"line {line}, {name[:1].upper()}{name[1:]}"
+    return finite_number(path, _cell(row, columns[name.lower()]), place)
 
 
 def _rate(stamps: Sequence[tuple[int, float]]) -> float:

@@ -42,6 +42,16 @@ def read_json(path: str | Path) -> dict[str, Any]:
     return data
 
 
+def check_format(data: Mapping[str, Any], name: str, version: int) -> None:
+    """Raises: Broken: another format than this one, or a version of it newer than this."""
+    if data.get("format") != name:
+        raise Broken("format", f"expected {name!r}, found {str(data.get('format'))[:40]!r}")
+    found = as_whole(data.get("version"), "version", above=0)
+    if found > version:
+        problem = f"{found} was written by a newer mien; this one reads up to {version}"
+        raise Broken("version", problem)
+
+
 def as_object(value: object, place: str, keys: Iterable[str] | None = None) -> dict[str, Any]:
     """An object with none but these keys. Raises: Broken: suggests the nearest keys."""
     if not isinstance(value, dict):

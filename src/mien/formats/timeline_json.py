@@ -26,6 +26,7 @@ from mien.formats.strict_json import (
     as_object,
     as_text,
     as_whole,
+    check_format,
     join,
     need,
     read_json,
@@ -82,7 +83,7 @@ def save_timeline(path: str | Path, timeline: Timeline) -> None:
 
 def timeline_from_json(data: Mapping[str, Any]) -> Timeline:
     """The performance that a document's contents describe. Raises: Broken; InputError."""
-    _check_header(data)
+    check_format(data, FORMAT, VERSION)
     top = as_object(data, "", _TOP)
     clips = as_object(top.get("clips", {}), "clips")
     return Timeline(
@@ -98,16 +99,6 @@ def timeline_from_json(data: Mapping[str, Any]) -> Timeline:
             for index, layer in enumerate(as_list(top.get("layers", []), "layers"))
         ),
     )
-
-
-def _check_header(data: Mapping[str, Any]) -> None:
-    if data.get("format") != FORMAT:
-        raise Broken("format", f"expected {FORMAT!r}, found {str(data.get('format'))[:40]!r}")
-    version = as_whole(data.get("version"), "version", above=0)
-    if version > VERSION:
-        raise Broken(
-            "version", f"{version} was written by a newer mien; this one reads up to {VERSION}"
-        )
 
 
 def _duration(data: dict[str, Any], place: str) -> float:
