@@ -95,17 +95,37 @@ def timecode(seconds: float) -> str:
     return f"{hours:02}:{minutes:02}:{whole % 60:02}:{frame:02}.{thousandths:03}"
 
 
-def _row(moment: Moment, given: Mapping[str, float]) -> list[str]:
+def values_of(moment: Moment, given: Mapping[str, float]) -> dict[str, float]:
+    """The 61 numbers of a frame: weights by UNITS, angles by HEAD_COLUMNS and EYE_COLUMNS.
+
+    Args:
+        given: weights of the units that stand for the moment's face.
+    Returns: in the order of the file's columns; Unreal's angles, radians.
+    Raises: InputError: a unit that the format does not know.
+    """
+    weights = unit_weights(moment.state, given)
+    yaw, pitch, roll = head_angles(moment.rotation, order="YXZ")
+    angles = [-yaw, pitch, -roll, *_eye_angles(weights)]
+    return weights | dict(zip((*HEAD_COLUMNS, *EYE_COLUMNS), angles, strict=True))
+
+
+def unit_weights(state: FaceState, given: Mapping[str, float]) -> dict[str, float]:
+    """All 52 UNITS: the given ones, and where the eyes look added to the EyeLook units.
+
+    Raises: InputError: a unit that is none of them.
+    """
     for name in given:
         if name not in UNITS:
             raise InputError("unit", "one of the 52 that Live Link Face has columns for", name)
-    weights = {name: given.get(name, 0.0) for name in UNITS}
-    for name, share in _looks(moment.state).items():
+    weights = {name: float(given.get(name, 0.0)) for name in UNITS}
+    for name, share in _looks(state).items():
         weights[name] += share
-    yaw, pitch, roll = head_angles(moment.rotation, order="YXZ")
-    angles = [-yaw, pitch, -roll, *_eye_angles(weights)]
+    return weights
+
+
+def _row(moment: Moment, given: Mapping[str, float]) -> list[str]:
     # Adding 0 turns -0 into 0.
-    numbers = [f"{value + 0.0:.10f}" for value in (*weights.values(), *angles)]
+    numbers = [f"{value + 0.0:.10f}" for value in values_of(moment, given).values()]
     return [timecode(moment.time), str(len(numbers)), *numbers]
 
 
