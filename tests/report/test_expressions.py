@@ -14,7 +14,7 @@ from mien.expressions.state import FaceState
 from mien.model.head import Expression, FittedView, Head
 from mien.render.picture import HeadRenderer
 from mien.report import ReportInput, render_report
-from mien.report.expressions import MIXTURES, expression_rows, face_psnr
+from mien.report.expressions import MIXTURES, expression_psnr, expression_rows
 from people import camera
 
 GENERIC = load_generic_head()
@@ -90,7 +90,7 @@ def test_only_the_face_counts(head: Head, photos: dict[str, Array]) -> None:
     photo = np.array(photos["a.png"])
     top = FRONT.project(VERTICES[[GENERIC.vertex_of("hairline.4")]])[0, 1]
     photo[: int(top) - 10] = 255
-    psnr, _ = face_psnr(HeadRenderer(head), "neutral", view, photo)
+    psnr, _ = expression_psnr(HeadRenderer(head), "neutral", view, photo)
     assert psnr > 60
 
 
@@ -98,9 +98,9 @@ def test_a_photos_own_exposure_is_undone(head: Head, photos: dict[str, Array]) -
     """The texture holds the photo's colours times the gains."""
     (view,) = head.expressions["neutral"].views
     photo = np.rint(photos["a.png"] / GAINS).astype(np.uint8)
-    psnr, _ = face_psnr(HeadRenderer(head), "neutral", replace(view, gains=GAINS), photo)
+    psnr, _ = expression_psnr(HeadRenderer(head), "neutral", replace(view, gains=GAINS), photo)
     assert psnr > 55
-    psnr, _ = face_psnr(HeadRenderer(head), "neutral", view, photo)
+    psnr, _ = expression_psnr(HeadRenderer(head), "neutral", view, photo)
     assert psnr < 35
 
 

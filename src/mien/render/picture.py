@@ -11,7 +11,7 @@ import numpy as np
 from mien.arrays import Array, UInt8
 from mien.camera import Camera
 from mien.expressions.rig import Rig
-from mien.expressions.state import FACE, FaceState
+from mien.expressions.state import FACE, FaceState, PosedFace
 from mien.model.head import Head
 from mien.render.morph import MorphRenderer
 from mien.render.orbit import orbit_camera, turntable
@@ -59,7 +59,16 @@ class HeadRenderer:
         background: tuple[int, int, int] | UInt8[Array, "h w 3"] | None = None,
     ) -> UInt8[Array, "h w 4"]:
         """(H, W, 4) sRGB with straight alpha. Raises: InputError: what the head cannot do."""
-        face = self.rig.evaluate(state)
+        return self.draw_posed(self.rig.evaluate(state), camera, background=background)
+
+    def draw_posed(
+        self,
+        face: PosedFace,
+        camera: Camera,
+        *,
+        background: tuple[int, int, int] | UInt8[Array, "h w 3"] | None = None,
+    ) -> UInt8[Array, "h w 4"]:
+        """The same of a face that the rig has posed."""
         return self._renderer.render(face, camera, samples=4, background=background)
 
 

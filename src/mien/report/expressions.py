@@ -14,6 +14,7 @@ from mien.expressions.state import FACE, FaceState
 from mien.model.head import NEUTRAL, FittedView, Head
 from mien.render.picture import GREY, HeadRenderer
 from mien.render.shade import over_background, render
+from mien.report.likeness import face_psnr
 from mien.report.pictures import data_uri
 
 MIXTURES = {
@@ -54,7 +55,7 @@ def expression_rows(
     return rows
 
 
-def face_psnr(
+def expression_psnr(
     renderer: HeadRenderer, name: str, view: FittedView, photo: UInt8[Array, "h w 3"]
 ) -> tuple[float, UInt8[Array, "h w 4"]]:
     """How near an expression, seen by its own camera, comes to its photo over the face, dB.
@@ -66,15 +67,13 @@ def face_psnr(
     picture = np.concatenate([colours, picture[..., 3:]], axis=2)
     # At the head's outline the photo has something else in its pixels.
     inside = _face_pixels(renderer.head, name, view.camera) & (picture[..., 3] == 255)
-    squared = (colours[inside].astype(np.float64) - photo[inside]) ** 2
-    psnr = 10 * np.log10(255**2 / max(float(squared.mean()), 1e-2)) if inside.any() else 0.0
-    return psnr, picture
+    return face_psnr(photo, picture, inside), picture
 
 
 def _row(
     renderer: HeadRenderer, name: str, view: FittedView, photo: UInt8[Array, "h w 3"]
 ) -> dict[str, Any]:
-    psnr, picture = face_psnr(renderer, name, view, photo)
+    psnr, picture = expression_psnr(renderer, name, view, photo)
     box = _box(picture[..., 3] > 0)
     factor = min(1.0, _HEIGHT / (box[0].stop - box[0].start))
     shown = {view.photo: photo, "mien": over_background(picture, GREY)[..., :3]}
