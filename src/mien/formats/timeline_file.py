@@ -9,16 +9,28 @@ from mien.errors import InputError
 
 
 def load_performance(path: str | Path) -> Timeline:
-    """The timeline in a .json document or a Live Link Face .csv recording.
+    """The timeline in a .json document, a Live Link Face .csv recording or a TRACK.csv.
 
-    Raises: InputError: another suffix, a file that cannot be read. FileFormatError: as
-        load_timeline and load_live_link.
+    Raises: InputError: another suffix, a file that cannot be read, a track without a face.
+        FileFormatError: as load_timeline, load_live_link and load_track.
     """
-    from mien.formats.live_link_read import load_live_link
     from mien.formats.timeline_json import load_timeline
 
-    loaders = {".json": load_timeline, ".csv": load_live_link}
+    loaders = {".json": load_timeline, ".csv": _load_table}
     suffix = Path(path).suffix.lower()
     if suffix not in loaders:
         raise InputError(path, f"a name that ends in {' or '.join(loaders)}", suffix or "no suffix")
     return loaders[suffix](path)
+
+
+def _load_table(path: str | Path) -> Timeline:
+    from mien.animate.tracked import track_timeline
+    from mien.formats.live_link_read import load_live_link
+    from mien.formats.track_csv import is_track, load_track
+
+    if not is_track(path):
+        return load_live_link(path)
+    track = load_track(path)
+    if all(frame.state is None for frame in track.frames):
+        raise InputError(path, "a track with at least one frame that shows a face", "none")
+    return track_timeline(track)
