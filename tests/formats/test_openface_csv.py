@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -156,3 +157,9 @@ def test_an_empty_track_is_refused(tmp_path: Path, rng: np.random.Generator) -> 
     with pytest.raises(InputError, match="at least one frame to write"):
         write_openface(tmp_path / "a.csv", track_of([], rng, layout=LAYOUT))
     assert not list(tmp_path.iterdir())
+
+
+def test_the_docs_table_is_the_codes() -> None:
+    page = Path(__file__).parents[2] / "docs" / "track-files.md"
+    rows = re.findall(r"^\| (AU\d\d) \|.*\| ([\w, ]+?)(?:;.*)? \|$", page.read_text(), re.MULTILINE)
+    assert {name: tuple(units.split(", ")) for name, units in rows} == dict(ACTION_UNITS)

@@ -57,13 +57,12 @@ def write_track(path: str | Path, track: Track) -> None:
         are not those of the layout.
     """
     check_track_place(path)
-    rows = [_row(track.layout, frame) for frame in track.frames]
     # Both are written before either takes its place.
     with atomic_file(path) as table, atomic_file(sidecar_of(path)) as sidecar:
         with table.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(columns_of(track.layout))
-            writer.writerows(rows)
+            writer.writerows(_row(track.layout, frame) for frame in track.frames)
         sidecar.write_text(sidecar_text(track), encoding="utf-8")
 
 
