@@ -1,36 +1,16 @@
-"""How far a track lies from the truth."""
+"""How far a track's faces lie from the true ones (its poses: mien.report.track_series)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
 from mien.arrays import Array, Float
 from mien.expressions.rig import Rig
-from mien.numeric.rotation import angle_between
 from mien.track.state import Track, TrackState
 
-__all__ = ["rotation_errors", "shape_errors", "translation_errors", "weight_errors"]
-
-_Error = Callable[[TrackState, TrackState], float]
-
-
-def rotation_errors(found: Track, true: Track) -> Float[Array, " n"]:
-    """(N,) degrees; NaN where the frame is lost."""
-    return _over_frames(
-        found, true, lambda a, b: float(np.degrees(angle_between(a.R_cam_head, b.R_cam_head)))
-    )
-
-
-def translation_errors(found: Track, true: Track) -> Float[Array, " n"]:
-    """(N,) percent of the head's true distance; NaN where the frame is lost."""
-
-    def error(a: TrackState, b: TrackState) -> float:
-        off = np.linalg.norm(a.t_cam_head - b.t_cam_head)
-        return float(100 * off / np.linalg.norm(b.t_cam_head))
-
-    return _over_frames(found, true, error)
+__all__ = ["shape_errors", "weight_errors"]
 
 
 def weight_errors(found: Track, true: Track) -> Float[Array, "n r"]:
@@ -40,9 +20,9 @@ def weight_errors(found: Track, true: Track) -> Float[Array, "n r"]:
     """
     names = tuple(dict.fromkeys((*true.layout.expressions, *found.layout.expressions)))
     rows = np.full((len(true.frames), len(true.layout.regions)), np.nan)
-    for index, (a, b) in _pairs(found, true):
+    for index, a, b in _pairs(found, true):
         for column, region in enumerate(true.layout.regions):
-            given, wanted = (_row(t, s, region) for t, s in ((found, a), (true, b)))
+            given, wanted = _row(found, a, region), _row(true, b, region)
             off = [abs(given.get(name, 0.0) - wanted.get(name, 0.0)) for name in names]
             rows[index, column] = np.mean(off)
     return rows
@@ -58,31 +38,23 @@ def shape_errors(
     Args:
         rigs: of the found and of the true head. mask: (V,) weights of the vertices.
     """
-
-    def error(a: TrackState, b: TrackState) -> float:
-        faces = [
+    errors = np.full(len(true.frames), np.nan)
+    for index, a, b in _pairs(found, true):
+        first, second = (
             rig.evaluate(state.face(track.layout)).vertices
             for rig, state, track in zip(rigs, (a, b), (found, true), strict=True)
-        ]
-        return float(np.average(np.linalg.norm(faces[0] - faces[1], axis=1), weights=mask))
-
-    return _over_frames(found, true, error)
-
-
-def _over_frames(found: Track, true: Track, error: _Error) -> Float[Array, " n"]:
-    errors = np.full(len(true.frames), np.nan)
-    for index, (a, b) in _pairs(found, true):
-        errors[index] = error(a, b)
+        )
+        errors[index] = np.average(np.linalg.norm(first - second, axis=1), weights=mask)
     return errors
 
 
-def _pairs(found: Track, true: Track) -> Iterator[tuple[int, tuple[TrackState, TrackState]]]:
+def _pairs(found: Track, true: Track) -> Iterator[tuple[int, TrackState, TrackState]]:
     """Row of the truth, and both states, of every frame that is found."""
     states = {frame.frame: frame.state for frame in found.frames}
     for index, frame in enumerate(true.frames):
         state = states.get(frame.frame)
         if state is not None and frame.state is not None:
-            yield index, (state, frame.state)
+            yield index, state, frame.state
 
 
 def _row(track: Track, state: TrackState, region: str) -> dict[str, float]:
