@@ -64,8 +64,8 @@ def camera() -> Iterator[Camera]:
     camera.deliver(None)
 
 
-def opened(camera: Camera, patience: float = 30.0) -> Webcam:
-    return Webcam(0, opened=lambda number: camera, clock=Ticks(), patience=patience)
+def opened(camera: Camera) -> Webcam:
+    return Webcam(0, opened=lambda number: camera, clock=Ticks(), patience=30.0)
 
 
 def test_what_is_known_before(camera: Camera) -> None:
@@ -126,13 +126,15 @@ def test_a_camera_that_is_pulled_out_ends_with_a_note(camera: Camera) -> None:
 
 
 def test_a_camera_that_hangs_ends_with_a_note(camera: Camera) -> None:
-    webcam = opened(camera, patience=0.01)
+    webcam = opened(camera)
+    webcam._patience = 0.01
     assert len(list(webcam.frames())) == 1
     assert webcam.notes == ["camera 0 stopped delivering after 1 pictures"]
 
 
 def test_close_lets_go_of_the_camera(camera: Camera) -> None:
-    webcam = opened(camera, patience=0.01)
+    webcam = opened(camera)
+    webcam._patience = 0.01
     webcam.close()
     camera.deliver(10)
     webcam._thread.join()

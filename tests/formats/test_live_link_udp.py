@@ -14,38 +14,11 @@ from mien.errors import InputError
 from mien.expressions.state import FaceState, Gaze
 from mien.formats.live_link import EYE_COLUMNS, HEAD_COLUMNS, UNITS, values_of
 from mien.formats.live_link_udp import NAMES, Packet, decode, encode
-
-# Unreal's EARFaceBlendShape, by number.
-ENUM = (
-    "eyeBlinkLeft eyeLookDownLeft eyeLookInLeft eyeLookOutLeft eyeLookUpLeft eyeSquintLeft "
-    "eyeWideLeft eyeBlinkRight eyeLookDownRight eyeLookInRight eyeLookOutRight eyeLookUpRight "
-    "eyeSquintRight eyeWideRight jawForward jawLeft jawRight jawOpen mouthClose mouthFunnel "
-    "mouthPucker mouthLeft mouthRight mouthSmileLeft mouthSmileRight mouthFrownLeft "
-    "mouthFrownRight mouthDimpleLeft mouthDimpleRight mouthStretchLeft mouthStretchRight "
-    "mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper mouthPressLeft mouthPressRight "
-    "mouthLowerDownLeft mouthLowerDownRight mouthUpperUpLeft mouthUpperUpRight browDownLeft "
-    "browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff cheekSquintLeft "
-    "cheekSquintRight noseSneerLeft noseSneerRight tongueOut HeadYaw HeadPitch HeadRoll LeftEyeYaw "
-    "LeftEyePitch LeftEyeRoll RightEyeYaw RightEyePitch RightEyeRoll"
-)
-UNREAL = ENUM.split()
+from packets import UNREAL, as_unreal_reads
 
 
 def packet(subject: str = "anna", seconds: float = 3725.5, **values: float) -> Packet:
     return Packet(subject, seconds, dict.fromkeys(NAMES, 0.0) | values)
-
-
-def as_unreal_reads(data: bytes) -> tuple[str, str, float, dict[str, float]]:
-    """Device, subject, seconds and values, by fixed places."""
-    assert data[0] == 6
-    device, data = data[5 : 5 + data[4]], data[5 + data[4] :]
-    length = int.from_bytes(data[:4], "big")
-    subject, data = data[4 : 4 + length], data[4 + length :]
-    frame, rate, divisor = (int.from_bytes(data[i : i + 4], "big") for i in (0, 8, 12))
-    part = np.frombuffer(data[4:8], ">f4")[0]
-    assert data[16] == 61
-    values = dict(zip(UNREAL, np.frombuffer(data[17:], ">f4").tolist(), strict=True))
-    return device.decode(), subject.decode(), (frame + float(part)) / rate * divisor, values
 
 
 def test_names_are_unreals_in_their_order() -> None:

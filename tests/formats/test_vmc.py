@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Mapping
-
 import numpy as np
 import pytest
 
@@ -14,41 +11,10 @@ from mien.errors import InputError
 from mien.expressions.state import FaceState, Gaze
 from mien.formats.live_link import UNITS
 from mien.formats.vmc import encode_face, encode_lost, unity_quaternion
+from packets import blend_values, messages
 
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 """Head space to Unity's and back: x is to the subject's left in one, to the right in the other."""
-
-
-def messages(data: bytes) -> list[tuple[str, list[object]]]:
-    """What an OSC bundle holds: texts padded to four bytes, numbers of four bytes."""
-    assert data[:16] == b"#bundle\0" + bytes(7) + b"\1"
-    found, place = [], 16
-    while place < len(data):
-        size = int.from_bytes(data[place : place + 4], "big")
-        found.append(message(data[place + 4 : place + 4 + size]))
-        place += 4 + size
-    assert place == len(data)
-    return found
-
-
-def message(data: bytes) -> tuple[str, list[object]]:
-    address, data = text(data)
-    types, data = text(data)
-    values: list[object] = []
-    for kind in types[1:]:
-        if kind == "s":
-            value, data = text(data)
-            values.append(value)
-        else:
-            values += struct.unpack(f">{kind}", data[:4])
-            data = data[4:]
-    assert not data
-    return address, values
-
-
-def text(data: bytes) -> tuple[str, bytes]:
-    end = data.index(0)
-    return data[:end].decode(), data[end + 4 - end % 4 :]
 
 
 def moment(state: FaceState | None = None, rotation: np.ndarray | None = None) -> Moment:
@@ -59,12 +25,6 @@ def moment(state: FaceState | None = None, rotation: np.ndarray | None = None) -
 def bones(data: bytes) -> dict[str, list[float]]:
     found = [values for address, values in messages(data) if address == "/VMC/Ext/Bone/Pos"]
     return {str(values[0]): [float(v) for v in values[1:]] for values in found}  # type: ignore[arg-type]
-
-
-def blends(data: bytes) -> Mapping[str, object]:
-    found = [values for address, values in messages(data) if address == "/VMC/Ext/Blend/Val"]
-    assert len({str(name) for name, _ in found}) == len(found)
-    return {str(name): value for name, value in found}
 
 
 def unity_matrix(quaternion: tuple[float, float, float, float]) -> np.ndarray:
@@ -127,14 +87,14 @@ def test_a_lost_face_leaves_the_avatar_as_it_is() -> None:
 
 
 def test_units_are_called_as_perfect_sync_calls_them() -> None:
-    found = blends(encode_face(moment(), {"jawOpen": 0.5, "browInnerUp": 0.25}))
+    found = blend_values(encode_face(moment(), {"jawOpen": 0.5, "browInnerUp": 0.25}))
     assert set(found) == {unit[0].upper() + unit[1:] for unit in UNITS}
     assert {n: v for n, v in found.items() if v} == {"JawOpen": 0.5, "BrowInnerUp": 0.25}
 
 
 def test_region_weights_go_by_region_and_expression() -> None:
     state = FaceState({"mouth": {"joy": 0.5, "anger": 0.25}, "eyes": {"joy": 0.0, "anger": 1.0}})
-    found = blends(encode_face(moment(state), {"mouthSmileLeft": 0.75}))
+    found = blend_values(encode_face(moment(state), {"mouthSmileLeft": 0.75}))
     assert found["MouthSmileLeft"] == 0.75
     assert {name: value for name, value in found.items() if "." in name} == {
         "mouth.joy": 0.5,
@@ -155,7 +115,7 @@ def test_head_and_eyes_turn() -> None:
     forward = unity_matrix(tuple(found["LeftEye"][3:])) @ [0, 0, 1]  # type: ignore[arg-type]
     wanted = [-np.sin(0.3) * np.cos(0.2), np.sin(0.2), np.cos(0.3) * np.cos(0.2)]
     np.testing.assert_allclose(forward, wanted, atol=1e-6)
-    assert float(str(blends(data)["EyeLookOutLeft"])) > 0
+    assert blend_values(data)["EyeLookOutLeft"] > 0
 
 
 def test_an_unknown_unit_is_named() -> None:

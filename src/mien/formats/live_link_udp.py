@@ -123,8 +123,14 @@ class _Reader:
             raise InputError(f"Live Link packet at byte {self.place}", expected, found)
 
 
-def _text(name: str, text: str) -> bytes:
+def check_name(name: str, text: str) -> bytes:
+    """A subject or device as it is sent. Raises: InputError: no or too many bytes."""
     coded = text.encode()
     if not 0 < len(coded) <= _MAX_NAME:
         raise InputError(name, f"a name of 1 to {_MAX_NAME} bytes", f"{len(coded)} bytes")
+    return coded
+
+
+def _text(name: str, text: str) -> bytes:
+    coded = check_name(name, text)
     return struct.pack(">i", len(coded)) + coded
