@@ -35,6 +35,19 @@ def test_times_count_from_the_beginning(tmp_path: Path) -> None:
     assert [frame.seconds for frame in video.frames()] == pytest.approx([0, 0.1, 0.3])
 
 
+def test_a_clip_that_changes_its_size_keeps_the_first(
+    tmp_path: Path, faces: dict[str, Array]
+) -> None:
+    large = written(tmp_path / "large.mts", [cv2.resize(faces["left"], (300, 400))] * 3)
+    small = written(tmp_path / "small.mts", [cv2.resize(faces["left"], (150, 200))] * 3)
+    (tmp_path / "a.mts").write_bytes(large.read_bytes() + small.read_bytes())
+    pictures = [frame.pixels().astype(int) for frame in Video(tmp_path / "a.mts").frames()]
+    assert len(pictures) == 6
+    for picture in pictures:
+        assert picture.shape == (400, 300, 3)
+        assert np.abs(picture - pictures[0]).mean() < 6
+
+
 @pytest.mark.parametrize("max_side", [320, 250])
 def test_pictures_reduced_in_size(tmp_path: Path, faces: dict[str, Array], max_side: int) -> None:
     """As good as averaging the converted picture, and not shifted against it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,13 +34,14 @@ class Frame:
     Attributes:
         index: from 0, in order of display.
         seconds: since the clip's beginning.
-        pixel_aspect: width of a stored pixel over its height.
-        raw: as the decoder gave it.
+        stored_size: width and height of the clip's pictures before they are turned upright, px,
+            their pixels made square.
+        raw: as the decoder gave it; of another size where a clip changes it on its way.
     """
 
     index: int
     seconds: float
-    pixel_aspect: float
+    stored_size: tuple[int, int]
     raw: VideoFrame
 
     @property
@@ -51,7 +52,7 @@ class Frame:
     @property
     def size(self) -> tuple[int, int]:
         """Width and height of its pixels, px."""
-        width, height = self._stored_size(None)
+        width, height = self.stored_size
         return (height, width) if self._quarters % 2 else (width, height)
 
     def pixels(self, *, max_side: int | None = None) -> UInt8[Array, "h w 3"]:
@@ -61,9 +62,10 @@ class Frame:
             max_side: px; a picture whose longer side is longer is reduced to it by averaging while
                 its colours are converted, which takes less than doing one after the other.
         """
-        width, height = self._stored_size(max_side)
+        factor = min(1.0, (max_side or np.inf) / max(self.stored_size))
+        width, height = (max(1, round(side * factor)) for side in self.stored_size)
         # The scaler's quickest way, "FAST_BILINEAR", shifts pictures by most of a pixel.
-        how = "BILINEAR" if height == self.raw.height else "AREA"
+        how = "AREA" if height < self.raw.height else "BILINEAR"
         stored = self.raw.to_ndarray(format="rgb24", width=width, height=height, interpolation=how)
         return np.ascontiguousarray(np.rot90(stored, self._quarters))
 
@@ -71,12 +73,6 @@ class Frame:
     def _quarters(self) -> int:
         """Turns to make it upright, counterclockwise as the flag and numpy count."""
         return round(self.raw.rotation / 90)
-
-    def _stored_size(self, max_side: int | None) -> tuple[int, int]:
-        """Width and height before it is turned, at most so long."""
-        width, height = max(1, round(self.raw.width * self.pixel_aspect)), self.raw.height
-        factor = min(1.0, (max_side or np.inf) / max(width, height))
-        return max(1, round(width * factor)), max(1, round(height * factor))
 
 
 @dataclass(frozen=True)
@@ -119,13 +115,8 @@ class Video:
         count = 0
         with self._opened() as container:
             stream = self._stream(container)
-            aspect = float(stream.sample_aspect_ratio or 1)
-            rate = float(stream.average_rate or _USUAL_RATE)
-            begin = (container.start_time or 0) / _PER_SECOND
             try:
-                for raw in container.decode(stream):
-                    seconds = count / rate if raw.time is None else raw.time - begin
-                    frame = Frame(count, seconds, aspect, raw)
+                for frame in _decoded(container, stream):
                     if frame.hdr:
                         self._note("HDR video: its colours are approximate")
                     yield frame
@@ -133,7 +124,7 @@ class Video:
             except av.FFmpegError as error:
                 reason = one_line(error.strerror or error)
                 self._note(f"the stream breaks after {count} frames ({reason})")
-            stated = stream.frames or _frames_in(container, rate)
+            stated = _stated_frames(container, stream)
             if 0 < count < 0.95 * stated - 2:
                 self._note(f"{count} of the {stated} frames that it states can be read")
         if not count:
@@ -145,10 +136,9 @@ class Video:
             width, height = next(frames).size
         with self._opened() as container:
             stream = self._stream(container)
-            rate = float(stream.average_rate or _USUAL_RATE)
             seconds = container.duration / _PER_SECOND if container.duration else None
-            count = stream.frames or _frames_in(container, rate)
-            return VideoFacts(width, height, rate, count, seconds)
+            count = _stated_frames(container, stream)
+            return VideoFacts(width, height, _rate(stream), count, seconds)
 
     def _note(self, note: str) -> None:
         if note not in self.notes:
@@ -176,6 +166,21 @@ class Video:
         return stream
 
 
-def _frames_in(container: InputContainer, rate: float) -> int:
-    """As the stated length tells; 0 when there is none."""
-    return round(container.duration / _PER_SECOND * rate) if container.duration else 0
+def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[Frame]:
+    """Raises: av.FFmpegError: where the stream breaks."""
+    begin = (container.start_time or 0) / _PER_SECOND
+    aspect = float(stream.sample_aspect_ratio or 1)
+    size: tuple[int, int] | None = None
+    for count, raw in enumerate(container.decode(stream)):
+        size = size or (max(1, round(raw.width * aspect)), raw.height)
+        seconds = count / _rate(stream) if raw.time is None else raw.time - begin
+        yield Frame(count, seconds, size, raw)
+
+
+def _rate(stream: VideoStream) -> float:
+    return float(stream.average_rate or _USUAL_RATE)
+
+
+def _stated_frames(container: InputContainer, stream: VideoStream) -> int:
+    """As the file says, or as its stated length tells; 0 when there is none."""
+    return stream.frames or round((container.duration or 0) / _PER_SECOND * _rate(stream))
