@@ -22,8 +22,8 @@ STATUS_COLOURS: dict[str, Colour] = {
     "reacquired": (255, 200, 60),
     "lost": (255, 96, 64),
 }
-_COLUMNS = (0.012, 0.11, 0.2, 0.31, 0.43)
-"""Where the words of a caption begin, as shares of its width: so that they stand still."""
+_COLUMNS = (0.6, 7.5, 13.0, 20.0, 28.0)
+"""Where the words of a caption begin, in sizes of its letters: so that they stand still."""
 
 
 def caption(found: TrackedFrame, width: int) -> UInt8[Array, "h w 3"]:
@@ -39,7 +39,7 @@ def caption(found: TrackedFrame, width: int) -> UInt8[Array, "h w 3"]:
         words += [f"error {found.rms:.1f} rms", f"{100 * found.seen:.0f} % seen"]
     for index, (left, word) in enumerate(zip(_COLUMNS, words, strict=False)):
         colour = STATUS_COLOURS[found.status] if index == 2 else _PLAIN
-        draw.text((left * width, height / 2), word, colour, _font(size), anchor="lm")
+        draw.text((left * size, height / 2), word, colour, _font(size), anchor="lm")
     return np.asarray(strip)
 
 

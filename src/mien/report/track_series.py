@@ -6,13 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mien.animate.tracked import FACING
 from mien.arrays import Array, Bool, Float, Int
 from mien.numeric.rotation import angle_between
 from mien.report.page import head_angles
 from mien.track.state import Track
-
-_FACING = np.diag([1.0, -1.0, -1.0])
-"""R_cam_head of a head that looks at the camera."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +97,6 @@ def quaternions(series: Series) -> Float[Array, "n 4"]:
     result = np.full((len(series.rotations), 4), np.nan)
     found = ~series.lost
     if found.any():
-        turned = Rotation.from_matrix(series.rotations[found] @ _FACING.T)
+        turned = Rotation.from_matrix(series.rotations[found] @ FACING.T)
         result[found] = turned.as_quat(canonical=True)
     return result
