@@ -9,6 +9,8 @@ from datetime import datetime
 from typing import Protocol
 from urllib.parse import SplitResult, urlsplit
 
+import numpy as np
+
 from mien.animate.timeline import Moment
 from mien.errors import InputError
 from mien.expressions.state import FaceState
@@ -17,6 +19,8 @@ from mien.formats.live_link import values_of
 
 HOST, SUBJECT = "127.0.0.1", "mien"
 PORTS = {"livelink": live_link_udp.PORT, "vmc": vmc.PORT}
+
+_AT_REST = Moment(0.0, FaceState(), np.eye(3), np.zeros(3))
 
 UnitsOf = Callable[[FaceState], Mapping[str, float]]
 
@@ -117,6 +121,8 @@ class Stream:
     def __init__(self, address: StreamAddress, units_of: UnitsOf) -> None:
         self.address, self._units_of = address, units_of
         self._encoder = _encoder_of(address)
+        # A subject that cannot be sent is told now; and what is slow once is done before it counts.
+        self._encoder.found(_AT_REST, {})
         self._failed, self._reason = 0, ""
         family, self._target = _resolved(address)
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
@@ -148,7 +154,6 @@ class Stream:
 def _encoder_of(address: StreamAddress) -> Encoder:
     if address.protocol == "vmc":
         return VmcEncoder()
-    live_link_udp.check_name("subject", address.subject)
     now = datetime.now()
     midnight = now.replace(hour=0, minute=0, second=0, microsecond=0)
     return LiveLinkEncoder(address.subject, (now - midnight).total_seconds())

@@ -123,14 +123,8 @@ class _Reader:
             raise InputError(f"Live Link packet at byte {self.place}", expected, found)
 
 
-def check_name(name: str, text: str) -> bytes:
-    """A subject or device as it is sent. Raises: InputError: no or too many bytes."""
+def _text(name: str, text: str) -> bytes:
     coded = text.encode()
     if not 0 < len(coded) <= _MAX_NAME:
         raise InputError(name, f"a name of 1 to {_MAX_NAME} bytes", f"{len(coded)} bytes")
-    return coded
-
-
-def _text(name: str, text: str) -> bytes:
-    coded = check_name(name, text)
     return struct.pack(">i", len(coded)) + coded
