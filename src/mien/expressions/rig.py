@@ -26,6 +26,7 @@ class Rig:
     Attributes:
         names: photographed expressions, neutral first: what the weights' columns stand for.
         textures: (h, w, 3) one for each name, of one size.
+        offsets: (K, V, 3) mm from neutral to each of them, eyeballs where neutral has them.
     Raises: InputError: a head of another topology than the generic one's, no texture for neutral,
         textures of different sizes.
     Source: P02 sec. 6.1.1: consensus geometry, weights by region. Units, contacts and what of an
@@ -48,13 +49,13 @@ class Rig:
         expressions = [head.expressions[name] for name in self.names]
         self._gaze = np.stack([item.gaze for item in expressions])
         self._mechanics = Mechanics.of(generic, self._neutral, self._units)
-        self._offsets = np.stack(
+        self.offsets = np.stack(
             [self._still_eyes(item.vertices) - self._neutral for item in expressions]
         )
         self._explained = Explanations.of(
             np.array([[item.units.get(n, 0.0) for n in self.unit_names] for item in expressions]),
             self._units,
-            self._offsets,
+            self.offsets,
             self._masks,
         )
         self._openings = Openings.of(generic, self._neutral)
@@ -82,7 +83,7 @@ class Rig:
         linear = self._neutral + np.tensordot(units, self._units, axes=1)
         driven = self._explained.driven(units) * np.clip(by_region[:, :1], 0, 1)
         weights = self._spread(by_region)
-        vertices = linear + np.einsum("vk,kvc->vc", weights, self._offsets)
+        vertices = linear + np.einsum("vk,kvc->vc", weights, self.offsets)
         vertices = self._turned_eyes(vertices, weights)
         if driven.any():
             along = self._spread(driven) * self._skin[:, None]
@@ -94,6 +95,16 @@ class Rig:
         else:
             vertices = self._mechanics.applied(vertices, state.units, state.gaze, contacts=contacts)
         return PosedFace(vertices, weights, self._brightness(vertices, weights))
+
+    def mask(self, region: str) -> Float[Array, " v"]:
+        """(V,) in [0, 1]: how far each vertex obeys this region's weights.
+
+        Raises: InputError: an unknown region.
+        """
+        _check_known("region", region, AROUND)
+        inside = [region in (name, *AROUND[name]) for name in MASKS]
+        mask: Array = self._masks[:, inside].sum(axis=1)
+        return mask + self._rest if region == FACE else mask
 
     def hull_notes(self, state: FaceState) -> tuple[str, ...]:
         """What a state asks for beyond the expressions that were photographed, by its regions.

@@ -1,0 +1,381 @@
+"""Normal equations of the residual, summed up pixel by pixel: J itself is never stored.
+
+The residual is eps(p) = 1/2 sum w rho(I_t - (gain I^ + bias)) of P02 sec. 6.1.2, with all three
+colours and a weight for each pixel, and a robust rho where P02 has the square; J = G + B of eq. (7), G by Sobel's gradient of the drawn picture
+and the chain rule through projection, rotation and shape (app. B), B by the pictures of the single
+expressions. What eq. (7) leaves to the reader: at a pixel that stays, a picture that moves to the
+right brings what was to its left, so G takes the gradient with a minus.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mien.arrays import Array, Float, Int
+from mien.numeric.threads import for_row_bands
+from mien.track.drawing import Drawing, Pose
+from mien.track.views import View
+
+_BLOCK = 8
+"""Rows summed up together: the same sums, whatever the number of threads."""
+POSE_UNKNOWNS = 7
+"""Rotation vector (applied from the left, P02 app. B.2), translation mm, log of the focal length."""
+
+
+class Comparison(NamedTuple):
+    """A drawn picture beside the target.
+
+    Attributes:
+        drawn, target: (h, w, 3) float32, plain or filtered alike.
+        weights: (h, w) float32 of the pixels.
+        gain, bias: (3,): target = gain * drawn + bias.
+        scale: grey levels. Geman and McClure's: a pixel that is off by it counts a quarter.
+    """
+
+    drawn: Float[Array, "h w 3"]
+    target: Float[Array, "h w 3"]
+    weights: Float[Array, "h w"]
+    gain: Float[Array, " 3"]
+    bias: Float[Array, " 3"]
+    scale: float
+
+
+class Answers(NamedTuple):
+    """Which of the N unknowns, the pose's seven and then the face's, concern which pixels.
+
+    Attributes:
+        active, counts: (F, A) those that move or mix each triangle, in its first `counts`, (F,).
+        region: (N,) in which region the mixture of textures changes with it; -1 for none.
+        direction: (N,) along which column of Q it does.
+        Q: (K, L) float32, P02 eq. (4). masks: (V, R) float32 of the regions.
+        triangles: (F, 3) vertex indices.
+    """
+
+    active: Int[Array, "f a"]
+    counts: Int[Array, " f"]
+    region: Int[Array, " n"]
+    direction: Int[Array, " n"]
+    Q: Float[Array, "k l"]
+    masks: Float[Array, "v r"]
+    triangles: Int[Array, "f 3"]
+
+
+@dataclass(frozen=True)
+class Equations:
+    """J^T W J, J^T W r, and what the residual is.
+
+    Attributes:
+        matrix: (N, N). vector: (N,), so that matrix @ step = vector lowers the residual.
+        squares: sum of w rho(r) over pixels and colours. weight: sum of w, over colours too.
+    """
+
+    matrix: Float[Array, "n n"]
+    vector: Float[Array, " n"]
+    squares: float
+    weight: float
+
+
+def mixture(drawing: Drawing, layers: Float[Array, "h w k 3"], triangles: Array) -> Array:
+    """(h, w, 3) P02 eq. (5): the sum of w_k I^_k, weights interpolated between vertices."""
+    if layers.shape[2] == 1:
+        return layers[:, :, 0]
+    height, width = drawing.ids.shape
+    out = np.zeros((height, width, 3), np.float32)
+    inputs = (drawing.ids, drawing.barycentrics, triangles, drawing.weights, layers)
+    for_row_bands(lambda a, b: _mix_rows(*inputs, a, b, out), height, work=height * width)
+    return out
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _mix_rows(
+    ids: Array,
+    barycentrics: Array,
+    triangles: Array,
+    weights: Array,
+    layers: Array,
+    first: int,
+    end: int,
+    out: Array,
+) -> None:
+    for row in range(first, end):
+        for col in range(ids.shape[1]):
+            t = ids[row, col]
+            if t < 0:
+                continue
+            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            b0 = barycentrics[row, col, 0]
+            b1 = barycentrics[row, col, 1]
+            b2 = barycentrics[row, col, 2]
+            for n in range(weights.shape[1]):
+                weight = b0 * weights[i, n] + b1 * weights[j, n] + b2 * weights[k, n]
+                if weight != 0.0:
+                    for c in range(3):
+                        out[row, col, c] += weight * layers[row, col, n, c]
+
+
+def pose_equations(drawing: Drawing, comparison: Comparison, pose: Pose, view: View) -> Equations:
+    """Of the seven unknowns of the pose, over the plain pictures."""
+    height, width = drawing.ids.shape
+    focal = view.focal * pose.zoom
+    blocks = -(-height // _BLOCK)
+    matrices = np.zeros((blocks, POSE_UNKNOWNS, POSE_UNKNOWNS))
+    vectors = np.zeros((blocks, POSE_UNKNOWNS))
+    totals = np.zeros((blocks, 2))
+    lens = (focal, view.cx, view.cy)
+
+    def rows(first: int, end: int) -> None:
+        for block in range(first, end):
+            _add_pose(
+                drawing.ids,
+                drawing.depth,
+                comparison,
+                pose.t,
+                lens,
+                block * _BLOCK,
+                min(block * _BLOCK + _BLOCK, height),
+                matrices[block],
+                vectors[block],
+                totals[block],
+            )
+
+    for_row_bands(rows, blocks, work=8 * height * width)
+    return _summed(matrices, vectors, totals)
+
+
+def band_equations(
+    drawing: Drawing,
+    layers: Float[Array, "h w k 3"],
+    comparison: Comparison,
+    flows: Float[Array, "v n 2"],
+    answers: Answers,
+) -> Equations:
+    """Of pose and face together, over band-pass filtered pictures.
+
+    Args:
+        layers: the expressions' pictures, filtered like the comparison's.
+        flows: of screen_flows.
+        answers: which parameters concern which pixels.
+    """
+    height, width = drawing.ids.shape
+    count = flows.shape[1]
+    blocks = -(-height // _BLOCK)
+    matrices, vectors = np.zeros((blocks, count, count)), np.zeros((blocks, count))
+    totals = np.zeros((blocks, 2))
+
+    def rows(first: int, end: int) -> None:
+        for block in range(first, end):
+            _add_bands(
+                drawing.ids,
+                drawing.barycentrics,
+                comparison,
+                layers,
+                flows,
+                answers,
+                block * _BLOCK,
+                min(block * _BLOCK + _BLOCK, height),
+                matrices[block],
+                vectors[block],
+                totals[block],
+            )
+
+    for_row_bands(rows, blocks, work=8 * height * width)
+    return _summed(matrices, vectors, totals)
+
+
+def _summed(matrices: Array, vectors: Array, totals: Array) -> Equations:
+    half = matrices.sum(axis=0)
+    matrix = half + np.tril(half, -1).T
+    squares, weight = totals.sum(axis=0).tolist()
+    return Equations(matrix, vectors.sum(axis=0), squares, 3 * weight)
+
+
+def screen_flows(
+    moves: Float[Array, "p v 3"], places: Float[Array, "v 3"], pose: Pose, view: View
+) -> Float[Array, "v n 2"]:
+    """(V, 7 + P, 2) px by which a step of 1 in each unknown moves each vertex, the pose's first.
+
+    Source: P02 app. B.1, B.2.
+    """
+    flows = np.empty((len(places), POSE_UNKNOWNS + len(moves), 2), np.float32)
+    _flow_rows(moves, places, pose.R, pose.t, view.focal * pose.zoom, flows)
+    return flows
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _flow_rows(moves: Array, places: Array, R: Array, t: Array, focal: float, flows: Array) -> None:
+    pose = np.empty((POSE_UNKNOWNS, 2))
+    for v in range(len(places)):
+        scale = focal / places[v, 2]
+        x, y = places[v, 0] / places[v, 2], places[v, 1] / places[v, 2]
+        _pose_flow(x, y, places[v, 2], t, focal, pose)
+        for p in range(POSE_UNKNOWNS):
+            flows[v, p, 0], flows[v, p, 1] = pose[p, 0], pose[p, 1]
+        for p in range(len(moves)):
+            a, b, c = moves[p, v, 0], moves[p, v, 1], moves[p, v, 2]
+            dx = R[0, 0] * a + R[0, 1] * b + R[0, 2] * c
+            dy = R[1, 0] * a + R[1, 1] * b + R[1, 2] * c
+            dz = R[2, 0] * a + R[2, 1] * b + R[2, 2] * c
+            flows[v, POSE_UNKNOWNS + p, 0] = scale * (dx - x * dz)
+            flows[v, POSE_UNKNOWNS + p, 1] = scale * (dy - y * dz)
+
+
+@njit(inline="always")
+def _pose_flow(x: float, y: float, z: float, t: Array, focal: float, flow: Array) -> None:
+    """Fill in px by which each unknown moves a point at depth z: f/z (dX - x dZ, dY - y dZ).
+
+    Args:
+        x, y: X/z and Y/z of the point, camera space.
+    """
+    scale = focal / z
+    # R m, about which the head turns: the place less the translation.
+    X, Y, Z = x * z - t[0], y * z - t[1], z - t[2]
+    flow[0, 0], flow[0, 1] = scale * (-x * Y), scale * (-Z - y * Y)
+    flow[1, 0], flow[1, 1] = scale * (Z + x * X), scale * (y * X)
+    flow[2, 0], flow[2, 1] = scale * (-Y), scale * X
+    flow[3, 0], flow[3, 1] = scale, 0.0
+    flow[4, 0], flow[4, 1] = 0.0, scale
+    flow[5, 0], flow[5, 1] = -scale * x, -scale * y
+    flow[6, 0], flow[6, 1] = focal * x, focal * y
+
+
+@njit(inline="always")
+def _sobel(picture: Array, row: int, col: int, c: int) -> tuple[float, float]:
+    """How a channel changes at this pixel where the picture moves by a px: minus its gradient."""
+    a, b = row - 1, row + 1
+    left, right = col - 1, col + 1
+    corners_x = picture[a, right, c] + picture[b, right, c]
+    corners_x -= picture[a, left, c] + picture[b, left, c]
+    corners_y = picture[b, left, c] + picture[b, right, c]
+    corners_y -= picture[a, left, c] + picture[a, right, c]
+    x = corners_x + 2.0 * (picture[row, right, c] - picture[row, left, c])
+    y = corners_y + 2.0 * (picture[b, col, c] - picture[a, col, c])
+    return -x / 8.0, -y / 8.0
+
+
+@njit(inline="always")
+def _whole(ids: Array, row: int, col: int) -> bool:
+    """Whether the pixel and all eight around it show the face.
+
+    At the outline there is no gradient, and a frame's pixel mixes the face with what is behind it.
+    """
+    if row == 0 or col == 0 or row == ids.shape[0] - 1 or col == ids.shape[1] - 1:
+        return False
+    for a in range(row - 1, row + 2):
+        for b in range(col - 1, col + 2):
+            if ids[a, b] < 0:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _add_pose(
+    ids: Array,
+    depth: Array,
+    comparison: Comparison,
+    t: Array,
+    lens: tuple[float, float, float],
+    first: int,
+    end: int,
+    matrix: Array,
+    vector: Array,
+    totals: Array,
+) -> None:
+    drawn, target, weights, gain, bias, scale = comparison
+    focal, cx, cy = lens
+    flow = np.empty((POSE_UNKNOWNS, 2))
+    for row in range(first, end):
+        for col in range(ids.shape[1]):
+            weight = weights[row, col]
+            if weight == 0.0 or not _whole(ids, row, col):
+                continue
+            squares, xx, xy, yy, xr, yr = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for c in range(3):
+                r = target[row, col, c] - gain[c] * drawn[row, col, c] - bias[c]
+                squares += r * r
+                gx, gy = _sobel(drawn, row, col, c)
+                gx, gy = gx * gain[c], gy * gain[c]
+                xx, xy, yy = xx + gx * gx, xy + gx * gy, yy + gy * gy
+                xr, yr = xr + gx * r, yr + gy * r
+            totals[1] += weight
+            trust = 1.0 / (1.0 + squares / (3.0 * scale * scale))
+            totals[0] += weight * trust * squares
+            weight *= trust * trust
+            x, y = (col + 0.5 - cx) / focal, (row + 0.5 - cy) / focal
+            _pose_flow(x, y, depth[row, col], t, focal, flow)
+            for p in range(POSE_UNKNOWNS):
+                a = weight * (xx * flow[p, 0] + xy * flow[p, 1])
+                b = weight * (xy * flow[p, 0] + yy * flow[p, 1])
+                vector[p] += weight * (xr * flow[p, 0] + yr * flow[p, 1])
+                for q in range(p + 1):
+                    matrix[p, q] += a * flow[q, 0] + b * flow[q, 1]
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _add_bands(
+    ids: Array,
+    barycentrics: Array,
+    comparison: Comparison,
+    layers: Array,
+    flows: Array,
+    answers: Answers,
+    first: int,
+    end: int,
+    matrix: Array,
+    vector: Array,
+    totals: Array,
+) -> None:
+    drawn, target, weights, gain, bias, scale = comparison
+    active, counts, region, direction, Q, masks, triangles = answers
+    columns = np.empty((active.shape[1], 3), np.float32)
+    along = np.empty((Q.shape[1], 3), np.float32)
+    shares = np.empty(masks.shape[1], np.float32)
+    residual, gx, gy = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
+    for row in range(first, end):
+        for col in range(ids.shape[1]):
+            weight = weights[row, col]
+            if weight == 0.0 or not _whole(ids, row, col):
+                continue
+            t = ids[row, col]
+            squares = np.float32(0.0)
+            for c in range(3):
+                r = target[row, col, c] - gain[c] * drawn[row, col, c] - bias[c]
+                residual[c] = r
+                squares += r * r
+                x, y = _sobel(drawn, row, col, c)
+                gx[c], gy[c] = gain[c] * x, gain[c] * y
+            totals[1] += weight
+            trust = 1.0 / (1.0 + squares / (3.0 * scale * scale))
+            totals[0] += weight * trust * squares
+            weight *= trust * trust
+            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            b0 = barycentrics[row, col, 0]
+            b1 = barycentrics[row, col, 1]
+            b2 = barycentrics[row, col, 2]
+            # Eq. (7)'s sum over k of dw_k/dp I^_k, but for the region's share.
+            for d in range(Q.shape[1]):
+                for c in range(3):
+                    total = np.float32(0.0)
+                    for n in range(Q.shape[0]):
+                        total += Q[n, d] * layers[row, col, n, c]
+                    along[d, c] = total * gain[c]
+            for n in range(masks.shape[1]):
+                shares[n] = b0 * masks[i, n] + b1 * masks[j, n] + b2 * masks[k, n]
+            for a in range(counts[t]):
+                p = active[t, a]
+                x = b0 * flows[i, p, 0] + b1 * flows[j, p, 0] + b2 * flows[k, p, 0]
+                y = b0 * flows[i, p, 1] + b1 * flows[j, p, 1] + b2 * flows[k, p, 1]
+                for c in range(3):
+                    columns[a, c] = gx[c] * x + gy[c] * y
+                    if region[p] >= 0:
+                        columns[a, c] += shares[region[p]] * along[direction[p], c]
+            for a in range(counts[t]):
+                p = active[t, a]
+                c0, c1, c2 = weight * columns[a, 0], weight * columns[a, 1], weight * columns[a, 2]
+                vector[p] += c0 * residual[0] + c1 * residual[1] + c2 * residual[2]
+                for b in range(a + 1):
+                    product = c0 * columns[b, 0] + c1 * columns[b, 1] + c2 * columns[b, 2]
+                    matrix[p, active[t, b]] += product

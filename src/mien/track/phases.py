@@ -1,0 +1,259 @@
+"""Pose, then expression, by Levenberg-Marquardt on one size of a picture (P02 sec. 6.1.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Bool, Float
+from mien.numeric.lm import minimize_lm
+from mien.numeric.rotation import rotation_from_vector, rotation_to_vector
+from mien.track.bands import band_pass, odd
+from mien.track.drawing import Drawing, Pose, draw
+from mien.track.equations import (
+    POSE_UNKNOWNS,
+    Comparison,
+    Equations,
+    band_equations,
+    mixture,
+    pose_equations,
+    screen_flows,
+)
+from mien.track.face import Anchor, FaceParameters, TrackedFace
+from mien.track.penalty import by_parameters, range_penalty
+from mien.track.views import View
+
+BAND = 0.2
+"""Width of the widest structures that expressions are told by, over the face's."""
+SAY = 0.02
+"""How much of a pixel's evidence is its own: neighbours err alike, and so do the three colours."""
+LIMIT = 50.0
+"""c of P02's D(p), in units of the cost: a weight that is 0.2 out of range costs 2."""
+_LEAST_NOISE = 2.0
+"""Grey levels: nothing is believed to be drawn better than this."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """P02's parameters p: where the head is and what the face does."""
+
+    pose: Pose
+    face: FaceParameters
+
+    def moved(self, step: Float[Array, " n"]) -> Guess:
+        """After a step in all unknowns: R <- R^ R (P02 app. B.2), everything else by addition."""
+        turned = rotation_from_vector(step[:3]) @ self.pose.R
+        zoom = self.pose.zoom * float(np.exp(step[6]))
+        pose = Pose(turned, self.pose.t + step[3:6], zoom)
+        return Guess(pose, self.face.moved(step[POSE_UNKNOWNS:]))
+
+    def since(self, other: Guess) -> Float[Array, " n"]:
+        """The step that leads here from another."""
+        turn = rotation_to_vector(self.pose.R @ other.pose.R.T)
+        zoom = np.log(self.pose.zoom / other.pose.zoom)
+        face = self.face.vector - other.face.vector
+        return np.concatenate([turn, self.pose.t - other.pose.t, [zoom], face])
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is expected before the picture is looked at.
+
+    Attributes:
+        mean: the likeliest.
+        deviations: (N,) standard deviations of a step away from it, each by itself.
+    """
+
+    mean: Guess
+    deviations: Float[Array, " n"]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One size of a frame, and all that a phase takes as given.
+
+    Attributes:
+        anchor: the face around which the model is linear.
+        gain, bias: (3,) of the frame's colours over the drawn ones'.
+        weights: (h, w) of the pixels.
+        scale: grey levels by which a pixel may be off and still count.
+        face_px: width of the face in this size.
+    """
+
+    model: TrackedFace
+    anchor: Anchor
+    view: View
+    gain: Float[Array, " 3"]
+    bias: Float[Array, " 3"]
+    weights: Float[Array, "h w"]
+    scale: float
+    face_px: float
+
+    def draw(self, guess: Guess, *, layers: bool) -> Drawing:
+        """The face as guessed; with `layers`, every expression's picture apart."""
+        face = self.model.posed(self.anchor, guess.face)
+        painted, compared = self.model.painted, self.model.compared
+        return draw(painted, compared, face, guess.pose, self.view, layers=layers)
+
+    def filtered(self, drawing: Drawing) -> tuple[Float[Array, "h w k 3"], Float[Array, "h w 3"]]:
+        """The drawing's layers and the frame, band-pass filtered over the face alone."""
+        width = odd(BAND * self.face_px)
+        return band_pass(drawing.layers, self.view.pixels, drawing.mask, self.weights, width)
+
+
+Linearize = Callable[[Scene, Guess], tuple[Equations, Drawing]]
+
+
+def by_plain_pictures(scene: Scene, guess: Guess) -> tuple[Equations, Drawing]:
+    """Equations of the pose alone, analytic; rows of the face's parameters are 0."""
+    drawing = scene.draw(guess, layers=False)
+    comparison = Comparison(
+        drawing.layers[:, :, 0],
+        scene.view.pixels,
+        scene.weights * drawing.mask,
+        scene.gain,
+        scene.bias,
+        scene.scale,
+    )
+    found = pose_equations(drawing, comparison, guess.pose, scene.view)
+    count = POSE_UNKNOWNS + len(guess.face.vector)
+    matrix, vector = np.zeros((count, count)), np.zeros(count)
+    matrix[:POSE_UNKNOWNS, :POSE_UNKNOWNS] = found.matrix
+    vector[:POSE_UNKNOWNS] = found.vector
+    return Equations(matrix, vector, found.squares, found.weight), drawing
+
+
+def by_plain(scene: Scene, guess: Guess) -> tuple[Equations, Drawing]:
+    model = scene.model
+    drawing = scene.draw(guess, layers=True)
+    layers, target = drawing.layers, scene.view.pixels
+    drawn = mixture(drawing, layers, model.painted.triangles)
+    weights = scene.weights * drawing.mask
+    comparison = Comparison(drawn, target, weights, scene.gain, scene.bias, scene.scale)
+    flows = screen_flows(model.moves, drawing.places, guess.pose, scene.view)
+    return band_equations(drawing, layers, comparison, flows, model.answers), drawing
+
+
+def by_bands(scene: Scene, guess: Guess) -> tuple[Equations, Drawing]:
+    """Equations of pose and face, analytic, over band-pass filtered pictures."""
+    model = scene.model
+    drawing = scene.draw(guess, layers=True)
+    layers, target = scene.filtered(drawing)
+    drawn = mixture(drawing, layers, model.painted.triangles)
+    weights = scene.weights * drawing.mask
+    comparison = Comparison(drawn, target, weights, scene.gain, np.zeros(3), scene.scale)
+    flows = screen_flows(model.moves, drawing.places, guess.pose, scene.view)
+    return band_equations(drawing, layers, comparison, flows, model.answers), drawing
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a phase found.
+
+    Attributes:
+        guess: of least cost.
+        deviations: (N,) standard deviations of the unknowns given picture and belief; the belief's
+            own for those that were not free.
+        drawing: of the guess. iterations: linearizations made.
+        rms: grey levels, of the pixels' weighted residual.
+    """
+
+    guess: Guess
+    deviations: Float[Array, " n"]
+    drawing: Drawing
+    iterations: int
+    rms: float
+
+
+def solve(
+    scene: Scene,
+    guess: Guess,
+    belief: Belief,
+    *,
+    linearized: Linearize,
+    free: Bool[Array, " n"],
+    iterations: int,
+    tolerance: float,
+) -> Answer:
+    """The free unknowns of least cost, by P02 eq. (6); damping is in proportion to the diagonal.
+
+    The cost is the squared residual of the pixels, in units of the noise that the guess leaves and
+    SAY of an observation each, plus half the squared distance from the belief, plus D(p).
+
+    Args:
+        linearized: gives the pixels' equations.
+        iterations, tolerance: where to stop (numeric.lm).
+    """
+    # The last two only: the loop goes back to the one before when a step fails.
+    seen: dict[int, tuple[Guess, Equations, Drawing]] = {}
+
+    def at(x: Guess) -> tuple[Guess, Equations, Drawing]:
+        if id(x) not in seen:
+            while len(seen) > 1:
+                del seen[next(iter(seen))]
+            seen[id(x)] = (x, *linearized(scene, x))
+        return seen[id(x)]
+
+    first = at(guess)[1]
+    noise = max(first.squares / max(first.weight, 1e-9), _LEAST_NOISE**2)
+
+    def scale(found: Equations) -> float:
+        # Pixels that come and go at the outline must not count as better or worse.
+        return SAY / noise * first.weight / max(found.weight, 1e-9)
+
+    def cost(x: Guess) -> float:
+        found = at(x)[1]
+        return scale(found) * found.squares / 2 + _prior(scene.model, x, belief)[0]
+
+    def normal(x: Guess) -> tuple[Array, Array]:
+        found = at(x)[1]
+        _, gradient, hessian = _prior(scene.model, x, belief)
+        factor = scale(found)
+        matrix = (factor * found.matrix + hessian)[np.ix_(free, free)]
+        return matrix, (factor * found.vector - gradient)[free]
+
+    def linearize(x: Guess) -> Callable[[float], tuple[Array, float]]:
+        matrix, downhill = normal(x)
+        diagonal = np.diag(matrix)
+
+        def step(damping: float) -> tuple[Array, float]:
+            found = np.linalg.solve(matrix + np.diag(damping * diagonal), downhill)
+            whole = np.zeros(len(free))
+            whole[free] = found
+            return whole, float(found @ (damping * diagonal * found + downhill)) / 2
+
+        return step
+
+    result = minimize_lm(
+        guess,
+        cost=cost,
+        linearize=linearize,
+        move=Guess.moved,
+        max_iterations=iterations,
+        tolerance=tolerance,
+    )
+    _, found, drawing = at(result.x)
+    deviations = belief.deviations.copy()
+    deviations[free] = np.sqrt(np.diag(np.linalg.inv(normal(result.x)[0])))
+    rms = float(np.sqrt(found.squares / max(found.weight, 1e-9)))
+    return Answer(result.x, deviations, drawing, result.iterations, rms)
+
+
+def _prior(model: TrackedFace, guess: Guess, belief: Belief) -> tuple[float, Array, Array]:
+    """Belief and D(p): value, gradient and Hessian."""
+    away, precision = guess.since(belief.mean), belief.deviations**-2.0
+    value, gradient, hessian = float(precision @ away**2) / 2, precision * away, np.diag(precision)
+    Q = model.basis.Q
+    start = POSE_UNKNOWNS
+    rows = [(row, Q) for row in model.basis.weights(guess.face.alpha)]
+    rows.append((guess.face.units, np.eye(len(guess.face.units))))
+    for weights, directions in rows:
+        limits = by_parameters(range_penalty(weights, LIMIT), directions)
+        own = slice(start, start + directions.shape[1])
+        value += limits.value
+        gradient[own] += limits.gradient
+        hessian[own, own] += limits.hessian
+        start = own.stop
+    return value, gradient, hessian

@@ -1,0 +1,183 @@
+"""Frame after frame: prediction, fit, and finding the face again (P02 sec. 6.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mien.arrays import Array, Float, UInt8
+from mien.camera import Camera
+from mien.capture.detector import LandmarkDetector
+from mien.model.head import Head
+from mien.numeric.rotation import rotation_from_vector, rotation_to_vector
+from mien.track.drawing import Pose
+from mien.track.equations import POSE_UNKNOWNS
+from mien.track.face import FaceParameters, TrackedFace
+from mien.track.fit import FitOptions, Fitted, FrameFit
+from mien.track.phases import Belief, Guess
+from mien.track.start import Starter
+from mien.track.state import Layout, Status, TrackedFrame, TrackState
+
+_POSE_DEVIATIONS = (0.1, 0.1, 0.1, 15.0, 15.0, 40.0, 0.3)
+"""Rotation (rad), translation (mm), log focal length: how far a head may go in a frame."""
+_WEIGHT_DEVIATION, _UNIT_DEVIATION, _GAZE_DEVIATION = 0.2, 0.2, 0.15
+"""How far what the face does may go from one frame to the next; of what pictures do not tell, this
+keeps the least change."""
+_LEAST_LIKENESS, _LEAST_SEEN = 0.6, 0.3
+"""Below these a face is lost: the drawn face does not look like the frame, or it is covered."""
+_USUAL_STEP = 1 / 25
+"""Seconds between two frames for which these hold."""
+
+
+@dataclass(frozen=True)
+class TrackOptions:
+    """How a video is tracked.
+
+    Attributes:
+        fit: how a frame is.
+        units: names of face units to track; by default blinks for a head with photographed
+            expressions, and all that a front view shows for one without.
+    """
+
+    fit: FitOptions = field(default_factory=FitOptions)
+    units: tuple[str, ...] | None = None
+
+
+class Tracker:
+    """Follows one head through a video.
+
+    Attributes:
+        layout: of the numbers that each frame gives.
+
+    Args:
+        width, height, focal_px: of the video's upright pictures.
+    Raises: InputError: as Rig.
+    """
+
+    def __init__(
+        self,
+        head: Head,
+        width: int,
+        height: int,
+        *,
+        focal_px: float,
+        detector: LandmarkDetector,
+        options: TrackOptions | None = None,
+    ) -> None:
+        options = options or TrackOptions()
+        self._model = TrackedFace(head, units=options.units)
+        self._fit = FrameFit(self._model, options.fit)
+        self.layout: Layout = self._model.layout
+        self._starter = Starter(head, self.layout, detector, rig=self._model.rig)
+        self._camera = Camera(width, height, focal_px, np.eye(3), np.array([0.0, 0.0, 1000.0]))
+        self._past: list[TrackedFrame] = []
+
+    def resume(self, frames: Sequence[TrackedFrame]) -> None:
+        """Go on as if these frames had been tracked."""
+        self._past = list(frames[-2:])
+
+    def step(self, pixels: UInt8[Array, "h w 3"], frame: int, time: float) -> TrackedFrame:
+        """What the next frame shows.
+
+        Args:
+            pixels: sRGB; the whole picture, in its own size or smaller.
+            frame: its number. time: seconds.
+        """
+        camera = self._camera.resized(pixels.shape[1] / self._camera.width)
+        camera = replace(camera, width=pixels.shape[1], height=pixels.shape[0])
+        status: Status = "ok"
+        fitted = self._followed(pixels, camera, time)
+        if fitted is None:
+            status = "reacquired" if self._past else "ok"
+            fitted = self._found(pixels, camera)
+        result = self._lost(frame, time) if fitted is None else self._shown(fitted, frame, time)
+        result = result if fitted is None else replace(result, status=status)
+        self._past = [*self._past[-1:], result]
+        return result
+
+    def _followed(self, pixels: Array, camera: Camera, time: float) -> Fitted | None:
+        """From where it was before; None where it is not there."""
+        if not self._past or self._past[-1].state is None:
+            return None
+        guess = self._predicted(time)
+        elapsed = max(time - self._past[-1].time, 1e-3) / _USUAL_STEP
+        belief = Belief(guess, self._deviations(min(np.sqrt(elapsed), 3.0)))
+        return _if_like(self._fit.fit(pixels, camera, guess, belief))
+
+    def _found(self, pixels: Array, camera: Camera) -> Fitted | None:
+        """By the detector; None where it finds no face, or another's."""
+        state = self._starter.find(pixels, focal_px=camera.focal_px)
+        if state is None:
+            return None
+        guess = self._guess(state)
+        # Twice: the detector's landmarks are some millimetres off.
+        belief = Belief(guess, self._deviations(1.5))
+        first = self._fit.fit(pixels, camera, guess, belief)
+        if first is None:
+            return None
+        belief = replace(belief, mean=first.guess)
+        return _if_like(self._fit.fit(pixels, camera, first.guess, belief))
+
+    def _deviations(self, factor: float) -> Float[Array, " n"]:
+        face = [_WEIGHT_DEVIATION] * self._model.neutral.alpha.size
+        face += [_UNIT_DEVIATION] * len(self.layout.units) + [_GAZE_DEVIATION] * 2
+        return factor * np.array([*_POSE_DEVIATIONS, *face])
+
+    def _guess(self, state: TrackState) -> Guess:
+        alpha = self._model.basis.alpha(state.weights)
+        return Guess(
+            Pose(state.R_cam_head, state.t_cam_head), FaceParameters(alpha, state.units, state.gaze)
+        )
+
+    def _predicted(self, time: float) -> Guess:
+        """Linearly from two frames (P02 sec. 6.2), the pose; what the face does stays."""
+        last = self._past[-1]
+        assert last.state is not None
+        guess = self._guess(last.state)
+        before = self._past[0]
+        if len(self._past) < 2 or before.state is None:
+            return guess
+        ahead = (time - last.time) / max(last.time - before.time, 1e-3)
+        ahead = float(np.clip(ahead, 0, 2))
+        turn = rotation_to_vector(last.state.R_cam_head @ before.state.R_cam_head.T)
+        shift = last.state.t_cam_head - before.state.t_cam_head
+        rotation = rotation_from_vector(ahead * turn) @ guess.pose.R
+        return replace(guess, pose=Pose(rotation, guess.pose.t + ahead * shift))
+
+    def _shown(self, fitted: Fitted, frame: int, time: float) -> TrackedFrame:
+        model, guess = self._model, fitted.guess
+        weights = model.weights(guess.face)
+        state = TrackState(guess.pose.R, guess.pose.t, weights, guess.face.units, guess.face.gaze)
+        return TrackedFrame(
+            frame,
+            time,
+            "ok",
+            state,
+            fitted.rms,
+            fitted.seen,
+            self._channel_deviations(fitted.deviations[POSE_UNKNOWNS:]),
+            fitted.gain,
+            fitted.bias,
+        )
+
+    def _channel_deviations(self, deviations: Array) -> Float[Array, " c"]:
+        """Of the layout's channels, from those of the parameters."""
+        alpha = self._model.neutral.alpha
+        own = deviations[: alpha.size].reshape(alpha.shape)
+        weights = np.sqrt(own**2 @ (self._model.basis.Q.T**2)).ravel()
+        rest = deviations[alpha.size :]
+        return np.concatenate([weights if alpha.size else np.empty(0), rest])
+
+    def _lost(self, frame: int, time: float) -> TrackedFrame:
+        unknown = np.full(len(self.layout.channels), np.nan)
+        return TrackedFrame(
+            frame, time, "lost", None, np.nan, 0.0, unknown, np.ones(3), np.zeros(3)
+        )
+
+
+def _if_like(fitted: Fitted | None) -> Fitted | None:
+    if fitted is None or fitted.likeness < _LEAST_LIKENESS or fitted.seen < _LEAST_SEEN:
+        return None
+    return fitted

@@ -1,0 +1,108 @@
+"""A frame as the tracker sees it: cut out around the face, at several sizes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from mien.arrays import Array, Float, UInt8
+from mien.camera import Camera
+
+_MARGIN = 0.3
+"""Of the face's extent, on every side: as far as it may move between two frames."""
+_STEPS = [Fraction(part, 4 * 2**n) for n in range(5) for part in (4, 3)]
+"""Scales: few and fixed, for one that followed the face would move every pixel's grid."""
+
+
+@dataclass(frozen=True)
+class View:
+    """One size of the cut-out.
+
+    Attributes:
+        pixels: (h, w, 3) float32, 0 to 255.
+        inside: (h, w) float32, 1 where the frame has a pixel, 0 beyond its borders.
+        focal, cx, cy: px of this size; the principal point from the cut-out's corner.
+    """
+
+    pixels: Float[Array, "h w 3"]
+    inside: Float[Array, "h w"]
+    focal: float
+    cx: float
+    cy: float
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, px."""
+        return self.pixels.shape[1], self.pixels.shape[0]
+
+    def with_focal(self, factor: float) -> View:
+        """The same picture through another lens."""
+        return View(self.pixels, self.inside, self.focal * factor, self.cx, self.cy)
+
+
+def cut_views(
+    pixels: UInt8[Array, "h w 3"],
+    camera: Camera,
+    points: Float[Array, "n 2"],
+    *,
+    face_px: float,
+    levels: int,
+) -> list[View]:
+    """The part of a frame around a face, the finest size first, each half of that before.
+
+    Args:
+        camera: of the frame's own pixels.
+        points: (N, 2) px where the face is thought to be.
+        face_px: width at which a face is compared; a smaller one stays as it is.
+        levels: how many sizes.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    extent = float((high - low).max())
+    factor = _scale(face_px / max(extent, 1.0))
+    margin = _MARGIN * extent
+    origin = np.floor(low - margin).astype(int)
+    # So that every level is a whole number of pixels.
+    multiple = factor.denominator * 2 ** (levels - 1)
+    side = np.ceil((high + margin - origin) / multiple).astype(int) * multiple
+    cut, inside = _cut(pixels, origin, side)
+    views = []
+    for level in range(levels):
+        scale = float(factor) / 2**level
+        cx, cy = (camera.principal - origin) * scale
+        sizes = tuple(np.rint(side * scale).astype(int).tolist())
+        views.append(
+            View(
+                _reduced(cut, sizes),
+                _reduced(inside, sizes),
+                camera.focal_px * scale,
+                float(cx),
+                float(cy),
+            )
+        )
+    return views
+
+
+def _scale(wanted: float) -> Fraction:
+    """The greatest step that is not more than an eighth above what is wanted."""
+    return next((step for step in _STEPS if step <= 1.125 * wanted), _STEPS[-1])
+
+
+def _cut(pixels: Array, origin: Array, side: Array) -> tuple[Array, Array]:
+    """The part of the frame, its last pixels repeated beyond its borders."""
+    height, width = pixels.shape[:2]
+    columns = origin[0] + np.arange(side[0])
+    rows = origin[1] + np.arange(side[1])
+    within = np.outer((rows >= 0) & (rows < height), (columns >= 0) & (columns < width))
+    cut = pixels[np.clip(rows, 0, height - 1)[:, None], np.clip(columns, 0, width - 1)]
+    return cut.astype(np.float32), within.astype(np.float32)
+
+
+def _reduced(image: Array, size: tuple[int, int]) -> Array:
+    import cv2
+
+    if image.shape[1::-1] == size:
+        return image
+    reduced: Array = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    return reduced
