@@ -27,7 +27,8 @@ def test_names_are_unreals_in_their_order() -> None:
 
 
 def test_another_reader_finds_what_was_sent(rng: np.random.Generator) -> None:
-    values = {name: float(np.float32(rng.uniform(-1, 1))) for name in NAMES}
+    values = {name: float(np.float32(rng.uniform(0, 1))) for name in UNITS}
+    values |= {name: float(np.float32(rng.normal())) for name in (*HEAD_COLUMNS, *EYE_COLUMNS)}
     data = encode(packet(**values))
     device, subject, seconds, found = as_unreal_reads(data)
     assert (subject, found) == ("anna", values)
@@ -43,6 +44,11 @@ def test_left_and_right_do_not_change_places() -> None:
         "jawLeft": 0.25,
         "mouthRight": 0.5,
     }
+
+
+def test_units_go_from_0_to_1_and_angles_where_they_will() -> None:
+    _, _, _, found = as_unreal_reads(encode(packet(jawOpen=-0.5, cheekPuff=1.5, HeadYaw=-1.5)))
+    assert (found["jawOpen"], found["cheekPuff"], found["HeadYaw"]) == (0, 1, -1.5)
 
 
 def test_a_moment_has_the_recordings_angles() -> None:

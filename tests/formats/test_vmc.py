@@ -92,6 +92,13 @@ def test_units_are_called_as_perfect_sync_calls_them() -> None:
     assert {n: v for n, v in found.items() if v} == {"JawOpen": 0.5, "BrowInnerUp": 0.25}
 
 
+def test_units_go_from_0_to_1_and_region_weights_as_found() -> None:
+    state = FaceState({"mouth": {"joy": -0.25, "anger": 1.25}})
+    found = blend_values(encode_face(moment(state), {"jawOpen": -0.5, "cheekPuff": 1.5}))
+    assert (found["JawOpen"], found["CheekPuff"]) == (0, 1)
+    assert (found["mouth.joy"], found["mouth.anger"]) == (-0.25, 1.25)
+
+
 def test_region_weights_go_by_region_and_expression() -> None:
     state = FaceState({"mouth": {"joy": 0.5, "anger": 0.25}, "eyes": {"joy": 0.0, "anger": 1.0}})
     found = blend_values(encode_face(moment(state), {"mouthSmileLeft": 0.75}))

@@ -14,6 +14,8 @@ import uuid
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from mien.errors import InputError
 from mien.formats.live_link import EYE_COLUMNS, HEAD_COLUMNS, TIMECODE_RATE, UNITS
 
@@ -51,7 +53,7 @@ class Packet:
 
 
 def encode(packet: Packet) -> bytes:
-    """The bytes of a packet.
+    """The bytes of a packet; weights of units are clipped to 0 and 1, as far as the app's go.
 
     Raises: InputError: a subject or device of no or of too many bytes, a negative time, values
         that are not all 61.
@@ -60,6 +62,8 @@ def encode(packet: Packet) -> bytes:
         raise InputError("values", f"the {len(NAMES)} of Live Link Face", len(packet.values))
     if not packet.seconds >= 0:
         raise InputError("seconds", "a time of 0 s or later", packet.seconds)
+    ordered = [packet.values[name] for name in NAMES]
+    values, angles = ordered[: len(UNITS)], ordered[len(UNITS) :]
     device = packet.device or str(uuid.uuid5(uuid.NAMESPACE_URL, packet.subject)).upper()
     frame, thousandths = divmod(round(packet.seconds * TIMECODE_RATE * 1000), 1000)
     return b"".join(
@@ -69,7 +73,7 @@ def encode(packet: Packet) -> bytes:
             _text("subject", packet.subject),
             _TIME.pack(frame, thousandths / 1000, TIMECODE_RATE, 1),
             bytes([len(NAMES)]),
-            _VALUES.pack(*(packet.values[name] for name in NAMES)),
+            _VALUES.pack(*np.clip(values, 0, 1), *angles),
         )
     )
 

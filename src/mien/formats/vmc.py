@@ -79,7 +79,9 @@ def _eye_rotation(gaze: Gaze) -> Array:
 
 
 def _blends(moment: Moment, given: Mapping[str, float]) -> Iterator[_Message]:
-    weights = {column_of(u): w for u, w in unit_weights(moment.state, given).items()}
+    # An avatar's clips go from 0 to 1; a region's weights are as they were found.
+    units = unit_weights(moment.state, given).items()
+    weights = {column_of(unit): min(max(weight, 0.0), 1.0) for unit, weight in units}
     for name, weight in (weights | _region_weights(moment.state)).items():
         yield "/VMC/Ext/Blend/Val", (name, float(weight))
     yield "/VMC/Ext/Blend/Apply", ()
