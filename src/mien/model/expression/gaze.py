@@ -20,7 +20,6 @@ def iris_directions(
 ) -> Float[Array, "2 3"] | None:
     """(2, 3) unit vectors from the centres of the left and the right eyeball to their irises.
 
-    The ray through an iris' centre meets its eyeball there; one that misses the ball grazes it.
     None where no landmarks are.
     """
     if view.landmarks is None:
@@ -32,14 +31,29 @@ def iris_directions(
         centre = ball.mean(axis=0)
         # A person's eyeball is no sphere: what counts is how far from its centre the iris lies.
         radius = float(np.linalg.norm(places[iris] - centre))
-        ray = camera.ray_directions(view.landmarks.points[iris][None])[0]
-        towards = centre - camera.center
-        along = float(towards @ ray)
-        off = towards - along * ray
-        reach = np.sqrt(max(radius**2 - float(off @ off), 0.0))
-        to_iris = (along - reach) * ray - towards
-        directions[row] = to_iris / np.linalg.norm(to_iris)
+        point = view.landmarks.points[iris]
+        directions[row] = direction_to_iris(camera, point, centre, radius)
     return directions
+
+
+def direction_to_iris(
+    camera: Camera, image_point: Float[Array, " 2"], centre: Float[Array, " 3"], radius: float
+) -> Float[Array, " 3"]:
+    """(3,) unit vector from an eyeball's centre to where a pixel's ray meets it.
+
+    A ray that misses the ball grazes it.
+
+    Args:
+        image_point: (2,) px. centre: (3,) mm, head space. radius: mm.
+    """
+    ray = camera.ray_directions(image_point[None])[0]
+    towards = centre - camera.center
+    along = float(towards @ ray)
+    off = towards - along * ray
+    reach = np.sqrt(max(radius**2 - float(off @ off), 0.0))
+    to_iris = (along - reach) * ray - towards
+    direction: Array = to_iris / np.linalg.norm(to_iris)
+    return direction
 
 
 def yaw_pitch_of(directions: Float[Array, "n 3"]) -> Float[Array, "n 2"]:

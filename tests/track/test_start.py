@@ -1,0 +1,241 @@
+"""Head and face found anew from landmarks that are known exactly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import posable
+from mien.arrays import Array
+from mien.camera import Camera
+from mien.capture.detector import LandmarkDetector
+from mien.capture.mediapipe_face import BLENDSHAPE_NAMES, LANDMARK_COUNT, DetectedFace
+from mien.errors import InputError
+from mien.model.head import Head
+from mien.numeric.rotation import angle_between, rotation_from_vector
+from mien.track.marks import Sight, facing, landmark_normals, places_meant
+from mien.track.start import Starter
+from mien.track.state import Layout, TrackState
+
+SIZE, FOCAL = (640, 480), 800.0
+FRONT = np.diag([1.0, -1.0, -1.0])
+LAYOUT = Layout(("mouth", "eyes", "forehead"), posable.NAMES, ("eyeBlinkLeft", "eyeBlinkRight"))
+
+
+class Blind(LandmarkDetector):
+    """Sees nothing: landmarks stay where the generic head has them."""
+
+    def __init__(self) -> None:
+        pass
+
+    def detect_fast(self, pixels: Array) -> DetectedFace | None:
+        return None
+
+
+class Shown(Blind):
+    """Sees the faces that it is told, one after the other."""
+
+    def __init__(self, *faces: DetectedFace | None) -> None:
+        self.faces = list(faces)
+        self.sizes: list[tuple[int, ...]] = []
+
+    def detect_fast(self, pixels: Array) -> DetectedFace | None:
+        self.sizes.append(pixels.shape[1::-1])
+        return self.faces.pop(0)
+
+
+def prepared(head: Head, layout: Layout) -> Starter:
+    """One whose detector errs by a millimetre and scores a unit of the layout by its weight."""
+    one = Starter(head, layout, Blind())
+    sigma = np.where(np.isfinite(one.marks.sigma_mm), 1.0, np.inf)
+    score_moves = np.zeros_like(one.marks.score_moves)
+    for row, name in enumerate(layout.units, len(score_moves) - len(layout.units)):
+        score_moves[row, BLENDSHAPE_NAMES.index(name)] = 1.0
+    one.marks = replace(one.marks, score_moves=score_moves, sigma_mm=sigma)
+    return one
+
+
+@cache
+def starter() -> Starter:
+    """Of the head as usual."""
+    return prepared(posable.head(), LAYOUT)
+
+
+def posed(degrees: tuple[float, float, float] = (5, -12, 4), **changes: Array) -> TrackState:
+    """A head turned like this (about the camera's x, y and z), making no face."""
+    weights = np.zeros((3, 4))
+    weights[:, 0] = 1
+    fields = {
+        "R_cam_head": rotation_from_vector(np.radians(degrees)) @ FRONT,
+        "t_cam_head": np.array([30.0, -20.0, 600.0]),
+        "weights": weights,
+        "units": np.zeros(2),
+        "gaze": np.zeros(2),
+    }
+    return TrackState(**(fields | changes))
+
+
+def face_of(
+    state: TrackState, *, noise: Array | float = 0.0, of: Starter | None = None
+) -> DetectedFace:
+    """What a detector without error, but one of 8 degrees in rotation, says of it."""
+    marks = (of or starter()).marks
+    unknowns = np.concatenate([state.weights[:, 1:].ravel(), state.units])
+    camera = Camera(*SIZE, FOCAL, state.R_cam_head, state.t_cam_head)
+    points = camera.project(marks.places + np.tensordot(unknowns, marks.moves, axes=1)) + noise
+    wrong = rotation_from_vector(np.radians([4.0, -6.0, 3.0])) @ state.R_cam_head
+    scores = marks.scores + unknowns @ marks.score_moves
+    return DetectedFace(np.column_stack([points, np.zeros(len(points))]), scores, wrong)
+
+
+def found(face: DetectedFace) -> TrackState:
+    state = starter().fit(face, size=SIZE, focal_px=FOCAL)
+    assert state is not None
+    return state
+
+
+def assert_pose(state: TrackState, truth: TrackState, *, degrees: float, share: float) -> None:
+    turned = angle_between(state.R_cam_head, truth.R_cam_head)
+    assert np.degrees(turned) < degrees
+    off = np.linalg.norm(state.t_cam_head - truth.t_cam_head) / truth.t_cam_head[2]
+    assert off < share
+
+
+@pytest.mark.parametrize("degrees", [(0, 0, 0), (10, -30, 5), (-15, 35, -20)])
+def test_neutral_face_in_any_pose(degrees: tuple[float, float, float]) -> None:
+    truth = posed(degrees)
+    state = found(face_of(truth))
+    assert_pose(state, truth, degrees=0.05, share=0.001)
+    np.testing.assert_allclose(state.weights[:, 0], 1, atol=0.02)
+    np.testing.assert_allclose(state.units, 0, atol=0.02)
+
+
+def test_an_expression_in_one_region_and_another_in_the_rest() -> None:
+    weights = np.array([[0.1, 0.9, 0, 0], [0.2, 0, 0.8, 0], [0.2, 0, 0.8, 0]])
+    truth = posed(weights=weights)
+    state = found(face_of(truth))
+    assert_pose(state, truth, degrees=0.5, share=0.005)
+    # What little moves around the eyes is taken to go with the rest.
+    np.testing.assert_allclose(state.weights[[0, 2]], weights[[0, 2]], atol=0.3)
+    np.testing.assert_array_equal(state.weights.argmax(axis=1), weights.argmax(axis=1))
+    np.testing.assert_allclose(state.weights.sum(axis=1), 1, atol=1e-12)
+
+
+def test_blink_of_one_eye() -> None:
+    truth = posed(units=np.array([0.9, 0.0]))
+    np.testing.assert_allclose(found(face_of(truth)).units, [0.9, 0.0], atol=0.12)
+
+
+def test_a_quarter_of_the_landmarks_astray_is_ignored(rng: np.random.Generator) -> None:
+    truth = posed()
+    noise = np.zeros((LANDMARK_COUNT, 2))
+    noise[rng.permutation(LANDMARK_COUNT)[: LANDMARK_COUNT // 4]] = (60.0, 40.0)
+    assert_pose(found(face_of(truth, noise=noise)), truth, degrees=1.0, share=0.01)
+
+
+@pytest.mark.parametrize("degrees", [(0.0, 0.0), (14.0, 0.0), (-10.0, 8.0)])
+def test_eyes_look_where_their_irises_say(degrees: tuple[float, float]) -> None:
+    truth, marks = posed(), starter().marks
+    camera = Camera(*SIZE, FOCAL, truth.R_cam_head, truth.t_cam_head)
+    face = face_of(truth)
+    points = face.points.copy()
+    eyes = posable.GENERIC.mesh
+    for side, iris in (("left", 473), ("right", 468)):
+        ball = np.unique(eyes.triangles[eyes.triangles_of(f"{side}_eyeball")])
+        centre = eyes.vertices[ball].mean(axis=0)
+        yaw, pitch = np.radians(degrees)
+        about_y, about_x = rotation_from_vector(np.array([[0, yaw, 0], [-pitch, 0, 0]]))
+        place = centre + about_y @ about_x @ (marks.places[iris] - centre)
+        points[iris, :2] = camera.project(place[None])[0]
+    state = found(DetectedFace(points, face.blendshapes, face.R_cam_head))
+    np.testing.assert_allclose(np.degrees(state.gaze), degrees, atol=1.0)
+
+
+def test_shut_eyes_look_nowhere() -> None:
+    face = face_of(posed())
+    points = face.points.copy()
+    for upper, lower, iris in ((386, 374, 473), (159, 145, 468)):
+        points[upper] = points[lower]
+        points[iris] += (8, 0, 0)
+    state = found(DetectedFace(points, face.blendshapes, face.R_cam_head))
+    np.testing.assert_array_equal(state.gaze, 0)
+
+
+def test_a_tracked_face_is_near_and_one_elsewhere_is_far() -> None:
+    state = posed()
+    face = face_of(state)
+    far = face_of(posed(t_cam_head=np.array([130.0, -20.0, 600.0])))
+    turned = face_of(posed((5, 13, 4)))
+    near, other, aside = (
+        starter().apart(seen, state, size=SIZE, focal_px=FOCAL) for seen in (face, far, turned)
+    )
+    assert near < 1e-6
+    assert other > 0.5
+    assert aside > 0.04
+    behind = posed(t_cam_head=np.array([0.0, 0.0, -600.0]))
+    assert starter().apart(face, behind, size=SIZE, focal_px=FOCAL) == np.inf
+
+
+def test_no_face_is_no_state() -> None:
+    pixels = np.zeros((480, 640, 3), np.uint8)
+    assert starter().find(pixels, focal_px=FOCAL) is None
+
+
+def test_a_small_face_is_looked_at_again_from_near_by() -> None:
+    face = face_of(posed())
+    corner = np.array([2000.0, 1000.0, 0.0])
+    small = DetectedFace(face.points + corner, face.blendshapes, face.R_cam_head)
+    pixels = np.zeros((2160, 3840, 3), np.uint8)
+    one = starter()
+    rough = DetectedFace(small.points + 3, face.blendshapes, face.R_cam_head)
+    again = Shown(rough, face)
+    one._detector, before = again, one._detector
+    seen = one.look(pixels)
+    one._detector = before
+    assert seen is not None
+    assert again.sizes[0] == (3840, 2160)
+    assert max(again.sizes[1]) < 600
+    moved = seen.points - face.points
+    np.testing.assert_allclose(moved, np.broadcast_to(moved[0], moved.shape), atol=1e-9)
+    assert (moved[0] == np.floor(moved[0])).all()
+
+
+def test_head_with_neutral_only_is_fitted_by_its_units() -> None:
+    head = posable.head_of(expressions={"neutral": posable.head().expressions["neutral"]})
+    names = ("jawOpen", "mouthSmileLeft", "mouthSmileRight", "browInnerUp")
+    one = prepared(head, Layout(("mouth", "eyes", "forehead"), ("neutral",), names))
+    truth = posed(weights=np.ones((3, 1)), units=np.array([0.7, 0.0, 0.5, 0.4]))
+    state = one.fit(face_of(truth, of=one), size=SIZE, focal_px=FOCAL)
+    assert state is not None
+    np.testing.assert_allclose(state.units, truth.units, atol=0.1)
+    np.testing.assert_array_equal(state.weights, np.ones((3, 1)))
+
+
+def test_layout_that_is_not_the_heads() -> None:
+    with pytest.raises(InputError, match="unit: expected one of the head's"):
+        Starter(posable.head(), Layout(("mouth",), posable.NAMES, ("wink",)), Blind())
+
+
+def test_pictures_tell_where_a_landmark_is_meant() -> None:
+    vertices = posable.REST
+    attached = posable.GENERIC.landmark_positions(vertices)
+    normals = landmark_normals(posable.GENERIC, posable.GENERIC.mesh)
+    shift = np.array([2.0, -3.0, 0.0])
+    sights = []
+    for yaw in (-20, 0, 20):
+        turned = rotation_from_vector(np.radians([0, yaw, 0])) @ FRONT
+        camera = Camera(*SIZE, FOCAL, turned, np.array([0.0, 0.0, 600.0]))
+        points = np.column_stack([camera.project(attached + shift), np.zeros(LANDMARK_COUNT)])
+        sights.append(Sight(camera, DetectedFace(points, np.full(52, 0.25), turned)))
+    meant = places_meant(attached, normals, sights)
+    seen = np.all([facing(s.camera, attached, normals) > 0.5 for s in sights], axis=0)
+    assert seen.sum() > 100
+    np.testing.assert_allclose(meant.beside[seen], np.tile(shift, (seen.sum(), 1)), atol=0.5)
+    np.testing.assert_array_equal(meant.scores, 0.25)
+    assert np.nanmax(np.abs(meant.misses[:, seen])) < 0.5
+    blind = places_meant(attached, normals, [])
+    np.testing.assert_array_equal(blind.beside, 0)
+    assert not blind.seen
