@@ -63,7 +63,7 @@ def encode(packet: Packet) -> bytes:
     if not packet.seconds >= 0:
         raise InputError("seconds", "a time of 0 s or later", packet.seconds)
     ordered = [packet.values[name] for name in NAMES]
-    values, angles = ordered[: len(UNITS)], ordered[len(UNITS) :]
+    weights, angles = ordered[: len(UNITS)], ordered[len(UNITS) :]
     device = packet.device or str(uuid.uuid5(uuid.NAMESPACE_URL, packet.subject)).upper()
     frame, thousandths = divmod(round(packet.seconds * TIMECODE_RATE * 1000), 1000)
     return b"".join(
@@ -73,7 +73,7 @@ def encode(packet: Packet) -> bytes:
             _text("subject", packet.subject),
             _TIME.pack(frame, thousandths / 1000, TIMECODE_RATE, 1),
             bytes([len(NAMES)]),
-            _VALUES.pack(*np.clip(values, 0, 1), *angles),
+            _VALUES.pack(*np.clip(weights, 0, 1), *angles),
         )
     )
 
