@@ -39,6 +39,8 @@ _WIDTH, _ROW, _ABOVE, _BELOW = 10.0, 0.82, 0.6, 0.5
 """Inches: of the whole, of a row, and of what is above and below the rows."""
 _LEFT, _RIGHT = 2.0, 0.2
 _DPI = 130
+_MANY = 2000
+"""Frames, from where on lines are thin."""
 _MARGIN = 0.06
 """Above and below a row's numbers, as a share of their range."""
 
@@ -90,11 +92,12 @@ def _draw_row(axis: Axes, row: Row, series: Series) -> None:
     for first, end in stretches(series.lost):
         axis.axvspan(frames[first] - 0.5, frames[end - 1] + 0.5, color=_LOST, lw=0)
     for frame in frames[_anew(series)].tolist():
-        axis.axvline(frame, color=_ANEW, lw=0.9)
+        axis.axvline(frame, ymin=0.8, color=_ANEW, lw=1.2)
     if row.deviations is not None:
         low, high = found - row.deviations, found + row.deviations
         axis.fill_between(frames, low, high, color=_FOUND, alpha=0.22, lw=0)
-    axis.plot(frames, found, color=_FOUND, lw=1.4, solid_joinstyle="round")
+    width = 1.4 if len(frames) < _MANY else 0.7
+    axis.plot(frames, found, color=_FOUND, lw=width, solid_joinstyle="round")
     alone = _alone(np.isfinite(found))
     axis.plot(frames[alone], found[alone], "o", color=_FOUND, ms=3)
     if row.truth is not None:
@@ -119,7 +122,7 @@ def _add_legend(figure: Figure, plot: Plot, series: Series, top: float) -> None:
     if series.lost.any():
         handles.append(Patch(color=_LOST, lw=0, label="lost"))
     if _anew(series).any():
-        handles.append(Line2D([], [], color=_ANEW, lw=0.9, label="found anew"))
+        handles.append(Line2D([], [], color=_ANEW, lw=1.2, label="found anew"))
     figure.legend(
         handles=handles,
         loc="center right",

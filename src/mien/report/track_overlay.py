@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import closing
 from itertools import repeat
 from pathlib import Path
 
 import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8
-from mien.capture.video import Video
+from mien.capture.frames_ahead import AHEAD, read_ahead
+from mien.capture.video import Frame, Video
 from mien.errors import InputError
 from mien.formats.video import write_video
 from mien.model.head import Head
@@ -19,6 +21,9 @@ from mien.report.likeness import draw_tracked
 from mien.report.track_caption import caption, say_lost
 from mien.report.track_window import Window, window_of
 from mien.track.state import Track, TrackedFrame
+
+Frames = Iterable[tuple[UInt8[Array, "h w 3"], TrackedFrame]]
+"""Pixels, and what was found in them."""
 
 PANELS = 3
 MAX_WIDTH, MAX_HEIGHT = 1920, 1080
@@ -48,19 +53,20 @@ def write_overlay(
         of its frames, a place that cannot be written. FileFormatError: not a video.
     """
     fps, counts = held(np.array([found.time for found in track.frames]), track.fps)
-    pictures = overlay_frames(decoded(video, track), track, head)
 
-    def frames() -> Iterator[UInt8[Array, "h w 3"]]:
+    def shown(frames: Frames) -> Iterator[UInt8[Array, "h w 3"]]:
         progress(0, len(counts))
-        for done, (picture, count) in enumerate(zip(pictures, counts.tolist(), strict=False), 1):
+        pictures = zip(overlay_frames(frames, track, head), counts.tolist(), strict=False)
+        for done, (picture, count) in enumerate(pictures, 1):
             yield from repeat(picture, count)
             progress(done, len(counts))
 
-    return write_video(path, frames(), fps)
+    with read_ahead(decoded(video, track), AHEAD) as frames:
+        return write_video(path, shown(frames), fps)
 
 
 def overlay_frames(
-    frames: Iterable[tuple[UInt8[Array, "h w 3"], TrackedFrame]],
+    frames: Frames,
     track: Track,
     head: Head | HeadRenderer,
 ) -> Iterator[UInt8[Array, "h w 3"]]:
@@ -83,22 +89,29 @@ def overlay_frames(
         yield np.concatenate([picture, caption(found, picture.shape[1])])
 
 
-def decoded(path: str | Path, track: Track) -> Iterator[tuple[UInt8[Array, "h w 3"], TrackedFrame]]:
+def decoded(
+    path: str | Path, track: Track
+) -> Generator[tuple[UInt8[Array, "h w 3"], TrackedFrame]]:
     """The frames of a video that a track is of, with what was found in them.
 
     Raises: InputError: a video of another size. FileFormatError: not a video.
     """
     by_number = {found.frame: found for found in track.frames}
     last = max(by_number, default=-1)
-    for frame in Video(Path(path)).frames():
-        if frame.index in by_number:
-            pixels = frame.pixels()
-            if pixels.shape[:2] != (track.height, track.width):
-                expected = f"{track.width}x{track.height} px as the track's video"
-                raise InputError(path, expected, f"{pixels.shape[1]}x{pixels.shape[0]}")
-            yield pixels, by_number[frame.index]
-        if frame.index >= last:
-            return
+    with closing(Video(Path(path)).frames()) as frames:
+        for frame in frames:
+            if frame.index in by_number:
+                yield _pixels(frame, path, track), by_number[frame.index]
+            if frame.index >= last:
+                return
+
+
+def _pixels(frame: Frame, path: str | Path, track: Track) -> UInt8[Array, "h w 3"]:
+    pixels = frame.pixels()
+    if pixels.shape[:2] != (track.height, track.width):
+        expected = f"{track.width}x{track.height} px as the track's video"
+        raise InputError(path, expected, f"{pixels.shape[1]}x{pixels.shape[0]}")
+    return pixels
 
 
 def held(times: Float[Array, " n"], fps: float) -> tuple[float, Int[Array, " n"]]:
