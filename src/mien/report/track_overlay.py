@@ -119,7 +119,8 @@ def held(times: Float[Array, " n"], fps: float) -> tuple[float, Int[Array, " n"]
     least.
 
     Args:
-        times: seconds. A clock that jumps back or far ahead is taken to have stood still.
+        times: seconds. A clock that jumps back is taken to have stood still, one that jumps ahead
+            to have gone on for ten seconds.
         fps: where there are no two frames that tell.
     """
     gaps = np.clip(np.diff(times), 0, _LONGEST_SECONDS)
