@@ -11,7 +11,7 @@ import os
 import secrets
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mien.errors import InputError
@@ -28,6 +28,10 @@ _PLACE_ERRORS = {
     errno.EPERM,
     errno.EROFS,
 }
+
+
+class _NothingWritten(Exception):
+    """Leaves what is in a place as it was."""
 
 
 @contextmanager
@@ -50,6 +54,15 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
             temporary.replace(target)
         finally:
             temporary.unlink(missing_ok=True)
+
+
+def check_file_place(path: str | Path) -> None:
+    """Refuse, before any work is done, a place that `atomic_file` could not take.
+
+    Folders above are made. Raises: InputError: as atomic_file.
+    """
+    with suppress(_NothingWritten), atomic_file(path):
+        raise _NothingWritten
 
 
 @contextmanager

@@ -12,7 +12,7 @@ import numpy as np
 
 from mien.arrays import Array, UInt8, check_image, check_positive
 from mien.errors import InputError
-from mien.formats.atomic import atomic_file
+from mien.formats.atomic import atomic_file, check_file_place
 
 # By container: the encoders that will do, the best first (a build of FFmpeg may lack libx264 for
 # its licence), and what the container itself is told. With its index moved to the front an .mp4
@@ -55,9 +55,7 @@ def write_video(
     """
     import av
 
-    suffix = Path(path).suffix.lower()
-    if suffix not in _ENCODERS:
-        raise InputError(path, f"a name that ends in {' or '.join(_ENCODERS)}", suffix or "none")
+    suffix = _check_suffix(path)
     rate = Fraction(check_positive("fps", fps)).limit_denominator(1001)
     encoder = _find_encoder(path, _ENCODERS[suffix])
     remaining = iter(frames)
@@ -86,6 +84,22 @@ def write_video(
             count += 1
         container.mux(stream.encode(None))
     return count
+
+
+def check_video_place(path: str | Path) -> None:
+    """Refuse, before any frame is made, a place that write_video would not take.
+
+    Raises: InputError: another suffix, a place that cannot be written.
+    """
+    _check_suffix(path)
+    check_file_place(path)
+
+
+def _check_suffix(path: str | Path) -> str:
+    suffix = Path(path).suffix.lower()
+    if suffix not in _ENCODERS:
+        raise InputError(path, f"a name that ends in {' or '.join(_ENCODERS)}", suffix or "none")
+    return suffix
 
 
 def _find_encoder(path: str | Path, names: tuple[str, ...]) -> str:

@@ -1,0 +1,151 @@
+"""`mien track`: the performance in a video, frame by frame, into a table."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING
+
+from mien.app.track_files import TrackFiles
+from mien.app.track_run import TrackRun
+from mien.arrays import check_positive
+from mien.capture.detector import LandmarkDetector
+from mien.capture.exif import FILM_DIAGONAL_MM
+from mien.capture.video import Video, VideoFacts
+from mien.errors import InputError
+from mien.model.head import Head
+from mien.track.smooth import smooth
+from mien.track.state import STATUSES, Status, Track, TrackedFrame
+from mien.track.tracker import TrackOptions
+
+if TYPE_CHECKING:
+    from mien.build import Progress
+
+MAX_SIDE = 1920
+"""px; larger pictures are tracked reduced to it. Reducing smaller ones would take longer than it
+saves: a face is compared at a size of its own anyway."""
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """What came of a video.
+
+    Attributes:
+        frames: how many. counts: of these, by status.
+        resumed: of these, how many an earlier run had tracked.
+        fps: frames tracked a second, decoding included; None where there was none to track.
+        rms: grey levels, the median of the frames'; None where all were lost.
+        focal_px: of the video's pictures.
+        notes: what the user should know.
+    """
+
+    frames: int
+    counts: dict[Status, int]
+    resumed: int
+    fps: float | None
+    rms: float | None
+    focal_px: float
+    notes: tuple[str, ...] = ()
+
+
+def track_video(
+    video: str | Path,
+    head: Head,
+    files: TrackFiles,
+    *,
+    focal_px: float | None = None,
+    lens_mm: float | None = None,
+    smooth_seconds: float | None = None,
+    resume: bool = False,
+    options: TrackOptions | None = None,
+    max_side: int = MAX_SIDE,
+    progress: Progress | None = None,
+) -> Tracked:
+    """Track a head through a video and write what was found, each file whole or not at all.
+
+    Every frame goes into a journal beside the table at once. A run that is stopped leaves it; one
+    that resumes goes on from there and gives the same files, byte for byte, as an unbroken one.
+
+    Args:
+        focal_px: of the video's pictures; lens_mm: the same on 35 mm film. Estimated over the
+            first frames unless either is given.
+        smooth_seconds: as track.smooth.smooth; nothing is smoothed unless given.
+        resume: go on where an earlier run was stopped; from the start where there was none.
+        max_side: px; larger pictures are tracked reduced to it.
+        progress: told the stage, the frames done and their total.
+    Raises: InputError, FileFormatError: before any work is done, a video or a place that cannot be
+        used, numbers, a journal of another run. EstimationError: no face to tell the lens by.
+    """
+    tell = progress or (lambda stage, done, total: None)
+    files.check()
+    if smooth_seconds is not None:
+        check_positive("smooth_seconds", smooth_seconds)
+    clip = Video(Path(video))
+    facts = clip.facts()
+    focal_px = _given_focal(facts, focal_px, lens_mm)
+    with LandmarkDetector() as detector:
+        run = TrackRun(
+            clip=clip,
+            facts=facts,
+            head=head,
+            focal_px=focal_px or estimate_focal(clip, head, detector, tell),
+            max_side=max_side,
+            options=options or TrackOptions(),
+        )
+        tracker = run.tracker(detector)
+        journal, kept, notes = run.journal(files.table, resume=resume)
+        with journal:
+            start = time.perf_counter()
+            frames = run.follow(tracker, journal, kept, tell)
+            seconds = time.perf_counter() - start
+            track = run.track(tracker.layout, frames)
+            shown = track if smooth_seconds is None else smooth(track, smooth_seconds)
+            notes += [*clip.notes, *_lost_notes(frames), *files.write(shown, clip.path, head, tell)]
+            journal.remove()
+    return _summary(track, len(kept), seconds, notes)
+
+
+def estimate_focal(clip: Video, head: Head, detector: LandmarkDetector, tell: Progress) -> float:
+    """px."""
+    facts = clip.facts()
+    return 1.2 * max(facts.width, facts.height)
+
+
+def _given_focal(facts: VideoFacts, focal_px: float | None, lens_mm: float | None) -> float | None:
+    """px. Raises: InputError: both, or one that is not positive."""
+    if focal_px is not None and lens_mm is not None:
+        raise InputError("focal length", "either px or mm", "both")
+    if lens_mm is not None:
+        diagonal = math.hypot(facts.width, facts.height)
+        return check_positive("lens_mm", lens_mm) / FILM_DIAGONAL_MM * diagonal
+    return None if focal_px is None else check_positive("focal_px", focal_px)
+
+
+def _lost_notes(frames: Sequence[TrackedFrame]) -> list[str]:
+    """How many frames, and when first."""
+    lost = [frame for frame in frames if frame.state is None]
+    if not lost:
+        return []
+    return [
+        f"the face is lost in {len(lost)} of {len(frames)} frames, at {lost[0].time:.2f} s first"
+    ]
+
+
+def _summary(track: Track, resumed: int, seconds: float, notes: Sequence[str]) -> Tracked:
+    found = Counter(frame.status for frame in track.frames)
+    count = len(track.frames)
+    errors = [frame.rms for frame in track.frames if frame.state is not None]
+    return Tracked(
+        frames=count,
+        counts={status: found[status] for status in STATUSES},
+        resumed=resumed,
+        fps=(count - resumed) / seconds if count > resumed else None,
+        rms=median(errors) if errors else None,
+        focal_px=track.focal_px,
+        notes=tuple(notes),
+    )

@@ -1,0 +1,102 @@
+"""What `mien track` writes beside its table: an overlay, plots, the track for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mien.animate.tracked import track_moments
+from mien.app.explained import units_of
+from mien.errors import InputError
+from mien.formats.atomic import check_file_place
+from mien.formats.live_link import write_live_link
+from mien.formats.openface_csv import write_openface
+from mien.formats.track_csv import check_track_place, write_track
+from mien.formats.video import check_video_place
+from mien.model.head import Head
+from mien.render.picture import HeadRenderer
+from mien.report.track_overlay import write_overlay
+from mien.report.track_plots import PAGE, write_track_plots
+from mien.track.state import Track
+
+if TYPE_CHECKING:
+    from mien.build import Progress
+
+OVERLAY, PLOTS = "Drawing the overlay", "Drawing plots"
+
+
+@dataclass(frozen=True)
+class TrackFiles:
+    """Where the results go; None: not wanted.
+
+    Attributes:
+        table: TRACK.csv, with TRACK.json beside it.
+        overlay: .mp4 or .webm. plots: a folder. live_link: a Live Link Face recording.
+        openface: a table like OpenFace's.
+    """
+
+    table: Path
+    overlay: Path | None = None
+    plots: Path | None = None
+    live_link: Path | None = None
+    openface: Path | None = None
+
+    def check(self) -> None:
+        """Refuse, before any work is done, places that cannot be written.
+
+        Raises: InputError: names the first of them; two results in one place.
+        """
+        check_track_place(self.table)
+        check_file_place(self.table)
+        if self.overlay:
+            check_video_place(self.overlay)
+        if self.plots:
+            check_file_place(self.plots / PAGE)
+        for path in filter(None, (self.live_link, self.openface)):
+            check_file_place(path)
+        self._check_apart()
+
+    def write(self, track: Track, video: Path, head: Head, tell: Progress) -> Iterator[str]:
+        """Write all of them, the table first.
+
+        Args:
+            video: that was tracked.
+            tell: told stage, steps done and their total.
+        Yields: what the user should know.
+        """
+        write_track(self.table, track)
+        explained = partial(units_of, head)
+        if self.openface:
+            write_openface(self.openface, track, units_of=explained)
+        if self.live_link and any(frame.state for frame in track.frames):
+            write_live_link(self.live_link, track_moments(track), units_of=explained)
+        elif self.live_link:
+            yield f"{self.live_link}: not written: no frame shows the face"
+        if self.overlay or self.plots:
+            self._draw(track, video, HeadRenderer(head), tell)
+
+    def _draw(self, track: Track, video: Path, renderer: HeadRenderer, tell: Progress) -> None:
+        if self.overlay:
+            write_overlay(self.overlay, video, track, renderer, progress=partial(tell, OVERLAY))
+        if self.plots:
+            write_track_plots(
+                self.plots,
+                track,
+                title=video.name,
+                video=video,
+                head=renderer,
+                progress=partial(tell, PLOTS),
+            )
+
+    def _check_apart(self) -> None:
+        taken: dict[Path, str] = {}
+        for field in fields(self):
+            path = getattr(self, field.name)
+            if path is None:
+                continue
+            before = taken.setdefault(Path(path).resolve(), field.name)
+            if before != field.name:
+                raise InputError(path, f"another name than that of the {before}", "the same")

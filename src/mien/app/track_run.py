@@ -1,0 +1,146 @@
+"""Frame after frame of a video through a tracker, each into a journal at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from mien.arrays import Array, UInt8
+from mien.capture.detector import LandmarkDetector
+from mien.capture.frames_ahead import frames_ahead
+from mien.capture.video import Video, VideoFacts
+from mien.formats.track_journal import Journal, journal_of, load_journal
+from mien.model.head import Head
+from mien.track.state import Layout, Track, TrackedFrame
+from mien.track.tracker import Tracker, TrackOptions
+
+if TYPE_CHECKING:
+    from mien.build import Progress
+
+TRACKING = "Tracking"
+_AGREE = 1e-3
+
+
+class VideoTracker(Protocol):
+    """What tracks; `mien.track.tracker.Tracker` does."""
+
+    layout: Layout
+
+    def step(self, pixels: UInt8[Array, "h w 3"], frame: int, time: float) -> TrackedFrame: ...
+
+    def resume(self, frames: Sequence[TrackedFrame]) -> None: ...
+
+
+@dataclass(frozen=True)
+class TrackRun:
+    """All that the frames of a run follow from.
+
+    Attributes:
+        focal_px: of the clip's pictures.
+        max_side: px; larger pictures are tracked reduced to it.
+    """
+
+    clip: Video
+    facts: VideoFacts
+    head: Head
+    focal_px: float
+    max_side: int
+    options: TrackOptions
+
+    def tracker(self, detector: LandmarkDetector) -> VideoTracker:
+        """Before the first frame."""
+        return Tracker(
+            self.head,
+            self.facts.width,
+            self.facts.height,
+            focal_px=self.focal_px,
+            detector=detector,
+            options=self.options,
+        )
+
+    def journal(
+        self, output: Path, *, resume: bool
+    ) -> tuple[Journal, tuple[TrackedFrame, ...], list[str]]:
+        """The journal of a new run, or of one that goes on with what was kept; notes.
+
+        Raises: InputError, FileFormatError: another run's, a place that cannot be written.
+        """
+        path, notes = journal_of(output), []
+        unfinished = path.exists()
+        if unfinished and not resume:
+            notes.append("an unfinished run was started over; it could have been resumed")
+        if resume and not unfinished:
+            notes.append("no unfinished run to resume: started with the first frame")
+        kept = load_journal(path, self.header) if resume and unfinished else ()
+        return Journal.start(path, self.header, kept), kept, notes
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """As JSON has it: runs that differ in it give other frames."""
+        path = self.clip.path
+        return {
+            "generator": f"mien {version('mien')}",
+            "video": {"name": path.name, "bytes": path.stat().st_size},
+            "head": digest(self.head),
+            "focal_px": self.focal_px,
+            "max_side": self.max_side,
+            "options": asdict(self.options),
+        }
+
+    def follow(
+        self,
+        tracker: VideoTracker,
+        journal: Journal,
+        kept: Sequence[TrackedFrame],
+        tell: Progress,
+    ) -> tuple[TrackedFrame, ...]:
+        """Every frame, those that are kept and the ones after them.
+
+        Args:
+            tell: told TRACKING, the frames done and their total.
+        """
+        frames, stated = list(kept), self.facts.frames
+        tracker.resume(frames)
+        tell(TRACKING, len(frames), stated)
+        with frames_ahead(self.clip, start=len(frames), max_side=self.max_side) as pictures:
+            for picture in pictures:
+                # The clock of a joined clip may jump back; a track's does not.
+                seconds = max(picture.seconds, frames[-1].time if frames else 0.0)
+                frames.append(tracker.step(picture.pixels, picture.frame, seconds))
+                journal.append(frames[-1])
+                tell(TRACKING, len(frames), stated and max(stated, len(frames)))
+        return tuple(frames)
+
+    def track(self, layout: Layout, frames: tuple[TrackedFrame, ...]) -> Track:
+        """Of all frames."""
+        facts = self.facts
+        fps = mean_rate(frames, facts.fps)
+        return Track(layout, facts.width, facts.height, self.focal_px, fps, frames)
+
+
+def mean_rate(frames: Sequence[TrackedFrame], stated: float) -> float:
+    """Frames a second by their times; as stated where they do not tell, or agree with it."""
+    elapsed = frames[-1].time - frames[0].time if frames else 0.0
+    if elapsed <= 0:
+        return stated
+    rate = (len(frames) - 1) / elapsed
+    return stated if abs(rate / stated - 1) < _AGREE else rate
+
+
+def digest(head: Head) -> str:
+    """Of all that a head looks like."""
+    arrays = {"triangles": head.mesh.triangles, "uvs": head.mesh.uvs, "units": head.units}
+    arrays |= {f"vertices {name}": item.vertices for name, item in head.expressions.items()}
+    arrays |= {f"texture {name}": pixels for name, pixels in head.textures.items()}
+    arrays |= {f"region {name}": mask for name, mask in head.regions.items()}
+    hashed = sha256(repr((head.unit_names, head.shading)).encode())
+    for name, array in arrays.items():
+        hashed.update(f"{name} {array.shape}".encode())
+        hashed.update(np.ascontiguousarray(array).data)
+    return hashed.hexdigest()
