@@ -101,8 +101,9 @@ def _weights_plot(region: str, track: Track, series: Series, truth: Series | Non
 
 
 def _units_plot(track: Track, series: Series, truth: Series | None) -> Plot:
-    """Of the units that move most."""
+    """Of the units that move most; blinks are with the eyes."""
     names = [f"units.{name}" for name in track.layout.units]
+    names = [name for name in names if name not in _BLINKS]
     moved = [_spread(series.values[name]) for name in names]
     most = sorted(np.argsort(moved)[::-1][:_MOST_UNITS].tolist())
     rows = tuple(
