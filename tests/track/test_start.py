@@ -2,93 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import cache
-
 import numpy as np
 import pytest
 
 import posable
-from mien.arrays import Array
+from marked import FOCAL, FRONT, SIZE, Blind, Shown, face_of, posed, prepared, starter
 from mien.camera import Camera
-from mien.capture.detector import LandmarkDetector
-from mien.capture.mediapipe_face import BLENDSHAPE_NAMES, LANDMARK_COUNT, DetectedFace
+from mien.capture.mediapipe_face import LANDMARK_COUNT, DetectedFace
 from mien.errors import InputError
-from mien.model.head import Head
 from mien.numeric.rotation import angle_between, rotation_from_vector
 from mien.track.marks import Sight, facing, landmark_normals, places_meant
 from mien.track.start import Starter
 from mien.track.state import Layout, TrackState
-
-SIZE, FOCAL = (640, 480), 800.0
-FRONT = np.diag([1.0, -1.0, -1.0])
-LAYOUT = Layout(("mouth", "eyes", "forehead"), posable.NAMES, ("eyeBlinkLeft", "eyeBlinkRight"))
-
-
-class Blind(LandmarkDetector):
-    """Sees nothing: landmarks stay where the generic head has them."""
-
-    def __init__(self) -> None:
-        pass
-
-    def detect_fast(self, pixels: Array) -> DetectedFace | None:
-        return None
-
-
-class Shown(Blind):
-    """Sees the faces that it is told, one after the other."""
-
-    def __init__(self, *faces: DetectedFace | None) -> None:
-        self.faces = list(faces)
-        self.sizes: list[tuple[int, ...]] = []
-
-    def detect_fast(self, pixels: Array) -> DetectedFace | None:
-        self.sizes.append(pixels.shape[1::-1])
-        return self.faces.pop(0)
-
-
-def prepared(head: Head, layout: Layout) -> Starter:
-    """One whose detector errs by a millimetre and scores a unit of the layout by its weight."""
-    one = Starter(head, layout, Blind())
-    sigma = np.where(np.isfinite(one.marks.sigma_mm), 1.0, np.inf)
-    score_moves = np.zeros_like(one.marks.score_moves)
-    for row, name in enumerate(layout.units, len(score_moves) - len(layout.units)):
-        score_moves[row, BLENDSHAPE_NAMES.index(name)] = 1.0
-    one.marks = replace(one.marks, score_moves=score_moves, sigma_mm=sigma)
-    return one
-
-
-@cache
-def starter() -> Starter:
-    """Of the head as usual."""
-    return prepared(posable.head(), LAYOUT)
-
-
-def posed(degrees: tuple[float, float, float] = (5, -12, 4), **changes: Array) -> TrackState:
-    """A head turned like this (about the camera's x, y and z), making no face."""
-    weights = np.zeros((3, 4))
-    weights[:, 0] = 1
-    fields = {
-        "R_cam_head": rotation_from_vector(np.radians(degrees)) @ FRONT,
-        "t_cam_head": np.array([30.0, -20.0, 600.0]),
-        "weights": weights,
-        "units": np.zeros(2),
-        "gaze": np.zeros(2),
-    }
-    return TrackState(**(fields | changes))
-
-
-def face_of(
-    state: TrackState, *, noise: Array | float = 0.0, of: Starter | None = None
-) -> DetectedFace:
-    """What a detector without error, but one of 8 degrees in rotation, says of it."""
-    marks = (of or starter()).marks
-    unknowns = np.concatenate([state.weights[:, 1:].ravel(), state.units])
-    camera = Camera(*SIZE, FOCAL, state.R_cam_head, state.t_cam_head)
-    points = camera.project(marks.places + np.tensordot(unknowns, marks.moves, axes=1)) + noise
-    wrong = rotation_from_vector(np.radians([4.0, -6.0, 3.0])) @ state.R_cam_head
-    scores = marks.scores + unknowns @ marks.score_moves
-    return DetectedFace(np.column_stack([points, np.zeros(len(points))]), scores, wrong)
 
 
 def found(face: DetectedFace) -> TrackState:
@@ -184,17 +109,15 @@ def test_no_face_is_no_state() -> None:
     assert starter().find(pixels, focal_px=FOCAL) is None
 
 
-def test_a_small_face_is_looked_at_again_from_near_by() -> None:
+def test_a_small_face_is_looked_at_again_from_near_by(monkeypatch: pytest.MonkeyPatch) -> None:
     face = face_of(posed())
     corner = np.array([2000.0, 1000.0, 0.0])
     small = DetectedFace(face.points + corner, face.blendshapes, face.R_cam_head)
     pixels = np.zeros((2160, 3840, 3), np.uint8)
-    one = starter()
     rough = DetectedFace(small.points + 3, face.blendshapes, face.R_cam_head)
     again = Shown(rough, face)
-    one._detector, before = again, one._detector
-    seen = one.look(pixels)
-    one._detector = before
+    monkeypatch.setattr(starter(), "_detector", again)
+    seen = starter().look(pixels)
     assert seen is not None
     assert again.sizes[0] == (3840, 2160)
     assert max(again.sizes[1]) < 600

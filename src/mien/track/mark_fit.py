@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mien.arrays import Array, Float
+from mien.arrays import Array, Float, Int
 from mien.capture.mediapipe_face import BLENDSHAPE_NAMES, DetectedFace
 from mien.model.dense.projection import UNKNOWNS, Pinholes, project_places
 from mien.numeric.lm import minimize_lm
@@ -65,8 +65,7 @@ class Observation:
         places: (N, 3) mm on the neutral face. moves: (N, 3, P) mm, of the face's unknowns.
         image_points: (N, 2) px less the principal point. sigma_mm: (N,) each axis.
         scores: (S,) more than in the neutral face. score_moves: (P, S).
-        R_cam_head: (3, 3) as the detector has it.
-        kept: (N,) which of the 478 landmarks.
+        R_cam_head: (3, 3) as the detector has it. kept: (N,) which of the 478 landmarks.
     """
 
     places: Float[Array, "n 3"]
@@ -76,6 +75,7 @@ class Observation:
     scores: Float[Array, " s"]
     score_moves: Float[Array, "p s"]
     R_cam_head: Float[Array, "3 3"]
+    kept: Int[Array, " n"]
 
     @staticmethod
     def of(marks: Marks, face: DetectedFace, size: tuple[int, int]) -> Observation:
@@ -90,6 +90,7 @@ class Observation:
             scores=(face.blendshapes - marks.scores)[_SCORED],
             score_moves=marks.score_moves[:, _SCORED],
             R_cam_head=face.R_cam_head,
+            kept=kept,
         )
 
     def start(self, focal_px: float) -> Guess:
@@ -102,6 +103,28 @@ class Observation:
         normal = np.einsum("ajn,akn->jk", rows, rows)
         t = np.linalg.solve(normal, np.einsum("ajn,an->j", rows, right))
         return Guess(self.R_cam_head, t, np.zeros(len(self.score_moves)))
+
+
+@dataclass(frozen=True)
+class Measured:
+    """How N landmarks lie off, with derivatives.
+
+    Attributes:
+        by_camera: (N, 2, 7) by the UNKNOWNS of a camera. by_place: (N, 2, 3) px / mm.
+        residuals: (N, 2) px. weights: (N,) 1 / px^2.
+    """
+
+    by_camera: Float[Array, "n 2 7"]
+    by_place: Float[Array, "n 2 3"]
+    residuals: Float[Array, "n 2"]
+    weights: Float[Array, " n"]
+
+    def normal_equations(self, moves: Float[Array, "n 3 m"]) -> tuple[Array, Array]:
+        """(7 + M, 7 + M) and (7 + M,): over the camera, and what moves the places, mm."""
+        jacobian = np.concatenate([self.by_camera, self.by_place @ moves], axis=2)
+        flat = jacobian.reshape(-1, jacobian.shape[2])
+        weighted = flat * np.repeat(self.weights, 2)[:, None]
+        return weighted.T @ flat, weighted.T @ self.residuals.ravel()
 
 
 class MarkProblem:
@@ -142,26 +165,27 @@ class MarkProblem:
         squares = off @ off + face @ self._likely @ face + beyond @ beyond
         return 0.5 * float(squares) + float(self._price @ face)
 
-    def normal_equations(self, guess: Guess) -> tuple[Array, Array]:
-        """(7 + P, 7 + P) and (7 + P,): Hessian and gradient over pose, log focal and face.
-
-        Raises: EstimationError: a landmark lies behind the camera.
-        """
+    def measured(self, guess: Guess) -> Measured:
+        """The landmarks at a guess. Raises: EstimationError: one lies behind the camera."""
         seen = self._seen
         camera = Pinholes(guess.R[None], guess.t[None], np.array([self._focal]))
         projection = project_places(camera, self._nowhere, seen.places + seen.moves @ guess.face)
         residuals = projection.image_points - seen.image_points
         _, share = loss_named("cauchy")((residuals**2).sum(axis=1) / self._sigma_px**2)
-        jacobian = np.concatenate(
-            [projection.by_camera(), projection.by_place @ seen.moves], axis=2
-        )
-        flat = jacobian.reshape(-1, jacobian.shape[2])
-        weighted = flat * np.repeat(share / (ALIKE * self._sigma_px**2), 2)[:, None]
-        hessian, gradient = weighted.T @ flat, weighted.T @ residuals.ravel()
-        self._add_belief(guess.face, hessian[UNKNOWNS:, UNKNOWNS:], gradient[UNKNOWNS:])
+        weights = share / (ALIKE * self._sigma_px**2)
+        return Measured(projection.by_camera(), projection.by_place, residuals, weights)
+
+    def normal_equations(self, guess: Guess) -> tuple[Array, Array]:
+        """(7 + P, 7 + P) and (7 + P,): Hessian and gradient over pose, log focal and face.
+
+        Raises: EstimationError: a landmark lies behind the camera.
+        """
+        hessian, gradient = self.measured(guess).normal_equations(self._seen.moves)
+        self.add_belief(guess.face, hessian[UNKNOWNS:, UNKNOWNS:], gradient[UNKNOWNS:])
         return hessian, gradient
 
-    def _add_belief(self, face: Array, hessian: Array, gradient: Array) -> None:
+    def add_belief(self, face: Array, hessian: Array, gradient: Array) -> None:
+        """What is usual, (P, P) and (P,), on top of what is there."""
         moves = self._seen.score_moves
         off = face @ moves - self._seen.scores
         beyond = self._regions @ face - 1

@@ -115,7 +115,7 @@ def measure_marks(rig: Rig, mesh: Mesh, layout: Layout, detector: LandmarkDetect
     expressions = [asked.meant(FaceState({FACE: {name: 1.0}})) for name in layout.expressions[1:]]
     units = [asked.meant(FaceState(units={name: 1.0}), views=1) for name in layout.units]
     masks = np.array([rig.mask(region) for region in layout.regions])
-    nearby, concerned = _at_landmarks(generic, masks.T).T, _of_scores(generic, masks)
+    nearby, concerned = at_landmarks(generic, masks.T).T, _of_scores(generic, masks)
     changes = [meant.change_from(neutral) for meant in expressions]
     moves = [near[:, None] * move for near in nearby for move, _ in changes]
     score_moves = [share * score for share in concerned for _, score in changes]
@@ -206,14 +206,17 @@ class _Pictures:
 
 def landmark_normals(generic: GenericHead, mesh: Mesh) -> Float[Array, "478 3"]:
     """(478, 3) unit normals of a head's surface at the places of the landmarks."""
-    normals = _at_landmarks(generic, mesh.vertex_normals())
+    normals = at_landmarks(generic, mesh.vertex_normals())
     unit: Array = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     return unit
 
 
-def _at_landmarks(generic: GenericHead, values: Float[Array, "v c"]) -> Float[Array, "478 c"]:
+def at_landmarks(generic: GenericHead, values: Float[Array, "*k v c"]) -> Float[Array, "*k 478 c"]:
+    """What vertices have, (..., V, C), at the places of the landmarks."""
     corners = generic.mesh.triangles[generic.landmark_triangles]
-    at: Array = np.einsum("lc,lcd->ld", generic.landmark_barycentrics, values[corners])
+    at: Array = np.einsum(
+        "lc,...lcd->...ld", generic.landmark_barycentrics, values[..., corners, :]
+    )
     return at
 
 

@@ -1,0 +1,224 @@
+"""The focal length of a video from where its frames show the landmarks of a known head."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mien.arrays import Array, Float, UInt8
+from mien.assets.generic import load_generic_head
+from mien.capture.mediapipe_face import DetectedFace
+from mien.errors import EstimationError, InputError
+from mien.model.dense.projection import UNKNOWNS
+from mien.model.head import Head
+from mien.numeric.rotation import angle_between
+from mien.numeric.schur import BlockSystem
+from mien.track.lens import LogFocal, expected_focal
+from mien.track.mark_fit import MOST, Guess, MarkProblem, Observation, fit_face
+from mien.track.marks import REPEATED_MM, at_landmarks
+from mien.track.start import Starter
+
+MOST_FRAMES = 16
+"""More add little."""
+_OTHERWISE_RAD, _OTHERWISE_NEAR = np.radians(5.0), 0.08
+"""A frame tells something new when its head is turned by this much or as much (in log distance)
+nearer than in all that were used: landmarks err alike where heads are seen alike."""
+_WAYS = 24
+"""Of heads to differ, the greatest first: landmarks are off in ways that look like a shape."""
+_ROUNDS, _SETTLED, _FARTHEST = 8, 1e-3, 0.3
+_FOCAL = UNKNOWNS - 1
+_LITTLE = 0.7
+
+
+@dataclass(frozen=True)
+class FocalEstimate:
+    """A video's focal length.
+
+    Attributes:
+        focal_px: of its upright pictures. deviation: of its logarithm; 0.1 is about 10 %.
+        frames_used: how many frames it rests on. note: one line for the user.
+    """
+
+    focal_px: float
+    deviation: float
+    frames_used: int
+    note: str
+
+
+class FocalEstimator:
+    """Gathers frames whose heads are seen differently, and weighs what they say together.
+
+    Unknown in common are the focal length and how far the head's shape is off; in every frame the
+    pose, what the face does, and how far the detector is off there. So a head that holds still
+    says little, however long it does.
+
+    Args:
+        starter: of the head. size: width and height of the video's upright pictures.
+        expected: what is known before; see lens.expected_focal.
+    """
+
+    def __init__(
+        self, starter: Starter, head: Head, size: tuple[int, int], expected: LogFocal
+    ) -> None:
+        self._starter, self._size, self._expected = starter, size, expected
+        ways = _ways_to_be_off()
+        spread = float(np.sqrt((ways**2).sum(axis=(1, 2)).mean()))
+        corners = load_generic_head().mesh.triangles[load_generic_head().landmark_triangles]
+        unsure = float(np.median(head.uncertainty_mm[corners]))
+        # Of the shape, and of the detector in a frame.
+        self._off_in_common = ways * (unsure / spread)
+        self._off_in_frame = ways * (np.sqrt(2) * REPEATED_MM / spread)
+        self._seen: list[Observation] = []
+        self._guesses: list[Guess] = []
+
+    @property
+    def frames_used(self) -> int:
+        """How many frames are kept."""
+        return len(self._seen)
+
+    def add(self, face: DetectedFace) -> bool:
+        """Keep a face, in px of the upright picture, if no other was seen as it is."""
+        if self.frames_used == MOST_FRAMES:
+            return False
+        seen = Observation.of(self._starter.marks, face, self._size)
+        focal = self._expected.focal_px
+        try:
+            guess = fit_face(seen, self._starter.layout, focal, start=seen.start(focal))
+        except EstimationError:
+            return False
+        if any(_alike(guess, other) for other in self._guesses):
+            return False
+        self._seen.append(seen)
+        self._guesses.append(guess)
+        return True
+
+    def estimate(self) -> LogFocal:
+        """The focal length of highest posterior, and how well it is known.
+
+        Raises: EstimationError: a landmark comes to lie behind the camera.
+        """
+        if not self._seen:
+            return self._expected
+        now, off = self._expected.mean, np.zeros(self._off_in_common.shape[2])
+        guesses, system = self._guesses, None
+        for _ in range(_ROUNDS):
+            system = self._system(now, off, guesses)
+            step = system.solve(0.0)[0]
+            ahead = float(np.clip(step[0], -_FARTHEST, _FARTHEST))
+            now, off = now + ahead, off + step[1:]
+            nearer = np.array([1.0, 1.0, np.exp(ahead)])
+            guesses = [
+                fit_face(
+                    seen,
+                    self._starter.layout,
+                    np.exp(now),
+                    start=replace(guess, t=guess.t * nearer),
+                )
+                for seen, guess in zip(self._shifted(off), guesses, strict=True)
+            ]
+            if abs(step[0]) < _SETTLED:
+                break
+        variance = float(self._system(now, off, guesses).covariance()[0][0, 0])
+        return LogFocal(now, 1 / variance)
+
+    def _shifted(self, off: Float[Array, " w"]) -> list[Observation]:
+        """What was seen, of a head whose landmarks are off like this."""
+        return [
+            replace(seen, places=seen.places + self._off_in_common[seen.kept] @ off)
+            for seen in self._seen
+        ]
+
+    def _system(
+        self, log_focal: float, off: Float[Array, " w"], guesses: Sequence[Guess]
+    ) -> BlockSystem:
+        """Normal equations: in common log focal length and shape, in each frame the rest."""
+        ways = len(off)
+        common, gradient = np.eye(1 + ways), np.concatenate([[0.0], off])
+        common[0, 0] = self._expected.precision
+        gradient[0] = self._expected.precision * (log_focal - self._expected.mean)
+        blocks, coupling, block_gradients = [], [], []
+        for seen, guess in zip(self._shifted(off), guesses, strict=True):
+            hessian, slope = self._frame(seen, guess, float(np.exp(log_focal)))
+            shared = np.zeros(len(slope), bool)
+            shared[[_FOCAL, *range(len(slope) - ways, len(slope))]] = True
+            common += hessian[np.ix_(shared, shared)]
+            gradient += slope[shared]
+            blocks.append(hessian[np.ix_(~shared, ~shared)])
+            coupling.append(hessian[np.ix_(shared, ~shared)])
+            block_gradients.append(slope[~shared])
+        return BlockSystem(
+            common, np.stack(blocks), np.stack(coupling), gradient, np.stack(block_gradients)
+        )
+
+    def _frame(self, seen: Observation, guess: Guess, focal_px: float) -> tuple[Array, Array]:
+        """Of one frame, over its camera, its face, what is off in it, and in common."""
+        problem = MarkProblem(seen, self._starter.layout, focal_px, near=guess)
+        off_in_frame = self._off_in_frame[seen.kept]
+        moves = [seen.moves, off_in_frame, self._off_in_common[seen.kept]]
+        hessian, gradient = problem.measured(guess).normal_equations(np.concatenate(moves, axis=2))
+        face = slice(UNKNOWNS, UNKNOWNS + len(guess.face))
+        problem.add_belief(guess.face, hessian[face, face], gradient[face])
+        own = np.arange(face.stop, face.stop + off_in_frame.shape[2])
+        hessian[own, own] += 1
+        # A weight at its bound stays there.
+        held = face.start + np.flatnonzero((guess.face <= 0) | (guess.face >= MOST))
+        hessian[held], hessian[:, held], gradient[held] = 0, 0, 0
+        hessian[held, held] = 1
+        return hessian, gradient
+
+
+def estimate_focal(
+    frames: Iterable[UInt8[Array, "h w 3"]],
+    starter: Starter,
+    head: Head,
+    *,
+    expected: LogFocal | None = None,
+) -> FocalEstimate:
+    """The focal length of a video from some of its first frames, every fifth, say.
+
+    Args:
+        frames: upright pictures of one size, at most as many as are worth 10 ms each.
+        expected: what is known before; by default lens.expected_focal.
+    Raises: InputError: no frames. EstimationError: no camera sees the landmarks so.
+    """
+    estimator, size = None, None
+    for pixels in frames:
+        if estimator is None:
+            size = (pixels.shape[1], pixels.shape[0])
+            expected = expected or expected_focal(head, *size)
+            estimator = FocalEstimator(starter, head, size, expected)
+        face = starter.look(pixels)
+        if face is not None:
+            estimator.add(face)
+    if estimator is None or size is None or expected is None:
+        raise InputError("frames", "at least one", "none")
+    found = estimator.estimate()
+    return FocalEstimate(
+        found.focal_px,
+        found.deviation,
+        estimator.frames_used,
+        _note(found, expected, size, estimator.frames_used),
+    )
+
+
+def _note(found: LogFocal, expected: LogFocal, size: tuple[int, int], frames: int) -> str:
+    angle = 2 * np.degrees(np.arctan(max(size) / 2 / found.focal_px))
+    lens = f"focal length {found.focal_px:.0f} px ({angle:.0f} degrees across)"
+    if found.deviation > _LITTLE * expected.deviation:
+        return f"{lens}, mostly as expected: the head moves too little to tell more"
+    return f"{lens}, good to {found.deviation:.0%}, from {frames} frames"
+
+
+def _ways_to_be_off() -> Float[Array, "478 3 w"]:
+    """(478, 3, W) mm: landmarks of heads that differ, each at one standard deviation."""
+    generic = load_generic_head()
+    components = at_landmarks(generic, generic.identity.components[:_WAYS])
+    return np.ascontiguousarray(components.transpose(1, 2, 0), np.float64)
+
+
+def _alike(guess: Guess, other: Guess) -> bool:
+    nearer = abs(float(np.log(guess.t[2] / other.t[2])))
+    turned = float(angle_between(guess.R, other.R))
+    return turned < _OTHERWISE_RAD and nearer < _OTHERWISE_NEAR
