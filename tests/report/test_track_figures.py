@@ -11,7 +11,7 @@ from mien.arrays import Array
 from mien.report.track_charts import Plot, Row, plots_of
 from mien.report.track_figures import limits_of, save_figure, stretches
 from mien.report.track_series import series_of
-from mien.track.state import Track
+from mien.track.state import Layout, Track
 from tracks import random_state, random_track, track_of
 
 
@@ -85,3 +85,8 @@ def test_rows_show_all_their_numbers() -> None:
 )
 def test_runs_of_a_mask(mask: str, runs: list[tuple[int, int]]) -> None:
     assert list(stretches(np.array([digit == "1" for digit in mask], bool))) == runs
+
+
+def test_expressions_of_any_name(tmp_path: Path, rng: np.random.Generator) -> None:
+    layout = Layout(("mouth",), ("neutral", "$joy_", "\u559c\u3073"))
+    saved(tmp_path / "a.png", random_track(rng, layout=layout))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +35,7 @@ _STYLE: dict[Any, Any] = {
     "xtick.labelcolor": "#333333",
     "ytick.labelcolor": "#333333",
     "svg.hashsalt": "mien",
+    "text.parse_math": False,
 }
 _WIDTH, _ROW, _ABOVE, _BELOW = 10.0, 0.82, 0.6, 0.5
 """Inches: of the whole, of a row, and of what is above and below the rows."""
@@ -55,7 +57,13 @@ def save_figure(path: str | Path, plot: Plot, series: Series) -> None:
     import matplotlib
 
     kind = Path(path).suffix[1:]
-    with matplotlib.rc_context(_STYLE), atomic_file(path) as temporary:
+    with (
+        matplotlib.rc_context(_STYLE),
+        warnings.catch_warnings(),
+        atomic_file(path) as temporary,
+    ):
+        # An expression may have a name in any script; what the font lacks is drawn as a box.
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
         # Without a date the same track gives the same file.
         metadata = {"Date": None} if kind == "svg" else {}
         _draw(plot, series).savefig(temporary, format=kind, dpi=_DPI, metadata=metadata)
