@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import re
+import time
 from pathlib import Path
 
 import pytest
@@ -16,6 +18,19 @@ def test_bars_are_drawn_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
     assert seen.out == ""
     assert "Finding faces" in seen.err
     assert "Thinking" in seen.err
+
+
+def test_frames_a_second_of_stages_counted_in_frames(capsys: pytest.CaptureFixture[str]) -> None:
+    with terminal_progress(quiet=False, counted=("Tracking",)) as progress:
+        for done in range(60, 101):
+            progress("Tracking", done, 100)
+            progress("Thinking", done, 100)
+            time.sleep(0.002)
+    tracking, thinking = capsys.readouterr().err.strip().splitlines()[-2:]
+    found = re.fullmatch(r"Tracking .* left 0:00:00 ([\d.]+) frames/s\s*", tracking)
+    assert found, tracking
+    assert float(found[1]) < 600, "the frames that an earlier run had done do not count"
+    assert "frames/s" not in thinking
 
 
 def test_quiet_draws_nothing(capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rich.progress import Task
+
     from mien.build import Progress
 
 
 @contextmanager
-def terminal_progress(quiet: bool) -> Iterator[Progress]:
+def terminal_progress(quiet: bool, *, counted: Collection[str] = ()) -> Iterator[Progress]:
     """A progress callback that draws bars on stderr while the block runs.
 
     Args:
         quiet: draw nothing.
+        counted: stages whose steps are frames; it is said how many a second.
     Yields: a function of (stage, done, total); total 0 means "unknown, still at it".
     """
     if quiet:
@@ -33,6 +36,7 @@ def terminal_progress(quiet: bool) -> Iterator[Progress]:
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
+        TextColumn("{task.fields[speed]}"),
         console=Console(stderr=True),
     )
     tasks: dict[str, TaskID] = {}
@@ -43,14 +47,21 @@ def terminal_progress(quiet: bool) -> Iterator[Progress]:
                 bars.console.print("First run: compiling kernels on the way, once, some 15 s.")
             bars.start()
         if stage not in tasks:
-            tasks[stage] = bars.add_task(stage, total=total or None)
+            tasks[stage] = bars.add_task(stage, total=total or None, speed="")
         bars.update(tasks[stage], completed=done, total=total or None)
+        if stage in counted:
+            bars.update(tasks[stage], speed=_speed(bars.tasks[tasks[stage]]))
 
     try:
         yield advance
     finally:
         if tasks:
             bars.stop()
+
+
+def _speed(task: Task) -> str:
+    """Over the last half-minute; what an earlier run had done does not count."""
+    return f"{task.speed:.1f} frames/s" if task.speed else ""
 
 
 def _kernels_are_compiled() -> bool:
