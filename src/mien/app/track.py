@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -12,13 +11,14 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 from mien.app.track_files import TrackFiles
+from mien.app.track_lens import find_focal
 from mien.app.track_run import TrackRun
 from mien.arrays import check_positive
 from mien.capture.detector import LandmarkDetector
-from mien.capture.exif import FILM_DIAGONAL_MM
-from mien.capture.video import Video, VideoFacts
-from mien.errors import InputError
+from mien.capture.video import Video
+from mien.formats.track_journal import journal_of
 from mien.model.head import Head
+from mien.track.lens import parse_lens
 from mien.track.smooth import smooth
 from mien.track.state import STATUSES, Status, Track, TrackedFrame
 from mien.track.tracker import TrackOptions
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 MAX_SIDE = 1920
 """px; larger pictures are tracked reduced to it. Reducing smaller ones would take longer than it
 saves: a face is compared at a size of its own anyway."""
+STARTED_OVER = "the run that was not finished was started over; it could have been resumed"
 
 
 @dataclass(frozen=True)
@@ -58,8 +59,7 @@ def track_video(
     head: Head,
     files: TrackFiles,
     *,
-    focal_px: float | None = None,
-    lens_mm: float | None = None,
+    lens: str | None = None,
     smooth_seconds: float | None = None,
     resume: bool = False,
     options: TrackOptions | None = None,
@@ -72,33 +72,30 @@ def track_video(
     that resumes goes on from there and gives the same files, byte for byte, as an unbroken one.
 
     Args:
-        focal_px: of the video's pictures; lens_mm: the same on 35 mm film. Estimated over the
-            first frames unless either is given.
+        lens: as for track.lens.parse_lens; estimated over the first frames unless given.
         smooth_seconds: as track.smooth.smooth; nothing is smoothed unless given.
         resume: go on where an earlier run was stopped; from the start where there was none.
         max_side: px; larger pictures are tracked reduced to it.
         progress: told the stage, the frames done and their total.
     Raises: InputError, FileFormatError: before any work is done, a video or a place that cannot be
-        used, numbers, a journal of another run. EstimationError: no face to tell the lens by.
+        used, a lens, a journal of another run.
     """
     tell = progress or (lambda stage, done, total: None)
-    files.check()
+    clip = Video(Path(video))
+    files.check(clip.path)
     if smooth_seconds is not None:
         check_positive("smooth_seconds", smooth_seconds)
-    clip = Video(Path(video))
     facts = clip.facts()
-    focal_px = _given_focal(facts, focal_px, lens_mm)
+    focal_px = None if lens is None else parse_lens(lens, facts.width, facts.height)
+    options = options or TrackOptions()
+    notes = [STARTED_OVER] if journal_of(files.table).exists() and not resume else []
     with LandmarkDetector() as detector:
-        run = TrackRun(
-            clip=clip,
-            facts=facts,
-            head=head,
-            focal_px=focal_px or estimate_focal(clip, head, detector, tell),
-            max_side=max_side,
-            options=options or TrackOptions(),
-        )
+        if focal_px is None:
+            focal_px, note = find_focal(clip, facts, head, options, detector, tell)
+            notes.append(note)
+        run = TrackRun(clip, facts, head, focal_px, max_side, options)
         tracker = run.tracker(detector)
-        journal, kept, notes = run.journal(files.table, resume=resume)
+        journal, kept = run.journal(files.table, resume=resume)
         with journal:
             start = time.perf_counter()
             frames = run.follow(tracker, journal, kept, tell)
@@ -108,22 +105,6 @@ def track_video(
             notes += [*clip.notes, *_lost_notes(frames), *files.write(shown, clip.path, head, tell)]
             journal.remove()
     return _summary(track, len(kept), seconds, notes)
-
-
-def estimate_focal(clip: Video, head: Head, detector: LandmarkDetector, tell: Progress) -> float:
-    """px."""
-    facts = clip.facts()
-    return 1.2 * max(facts.width, facts.height)
-
-
-def _given_focal(facts: VideoFacts, focal_px: float | None, lens_mm: float | None) -> float | None:
-    """px. Raises: InputError: both, or one that is not positive."""
-    if focal_px is not None and lens_mm is not None:
-        raise InputError("focal length", "either px or mm", "both")
-    if lens_mm is not None:
-        diagonal = math.hypot(facts.width, facts.height)
-        return check_positive("lens_mm", lens_mm) / FILM_DIAGONAL_MM * diagonal
-    return None if focal_px is None else check_positive("focal_px", focal_px)
 
 
 def _lost_notes(frames: Sequence[TrackedFrame]) -> list[str]:

@@ -44,11 +44,12 @@ class TrackFiles:
     live_link: Path | None = None
     openface: Path | None = None
 
-    def check(self) -> None:
+    def check(self, video: Path) -> None:
         """Refuse, before any work is done, places that cannot be written.
 
-        Raises: InputError: names the first of them; two results in one place.
+        Raises: InputError: names the first of them; two results, or one and the video, in one.
         """
+        self._check_apart(video)
         check_track_place(self.table)
         check_file_place(self.table)
         if self.overlay:
@@ -57,7 +58,6 @@ class TrackFiles:
             check_file_place(self.plots / PAGE)
         for path in filter(None, (self.live_link, self.openface)):
             check_file_place(path)
-        self._check_apart()
 
     def write(self, track: Track, video: Path, head: Head, tell: Progress) -> Iterator[str]:
         """Write all of them, the table first.
@@ -91,12 +91,10 @@ class TrackFiles:
                 progress=partial(tell, PLOTS),
             )
 
-    def _check_apart(self) -> None:
-        taken: dict[Path, str] = {}
-        for field in fields(self):
-            path = getattr(self, field.name)
-            if path is None:
-                continue
-            before = taken.setdefault(Path(path).resolve(), field.name)
-            if before != field.name:
-                raise InputError(path, f"another name than that of the {before}", "the same")
+    def _check_apart(self, video: Path) -> None:
+        taken = {video.resolve(): "video"}
+        for name, path in ((field.name, getattr(self, field.name)) for field in fields(self)):
+            if path is not None:
+                other = taken.setdefault(path.resolve(), name)
+                if other != name:
+                    raise InputError(path, f"another name than that of the {other}", "the same")

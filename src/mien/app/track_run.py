@@ -64,21 +64,14 @@ class TrackRun:
             options=self.options,
         )
 
-    def journal(
-        self, output: Path, *, resume: bool
-    ) -> tuple[Journal, tuple[TrackedFrame, ...], list[str]]:
-        """The journal of a new run, or of one that goes on with what was kept; notes.
+    def journal(self, output: Path, *, resume: bool) -> tuple[Journal, tuple[TrackedFrame, ...]]:
+        """The journal of a new run, or of one that goes on with what was kept.
 
         Raises: InputError, FileFormatError: another run's, a place that cannot be written.
         """
-        path, notes = journal_of(output), []
-        unfinished = path.exists()
-        if unfinished and not resume:
-            notes.append("an unfinished run was started over; it could have been resumed")
-        if resume and not unfinished:
-            notes.append("no unfinished run to resume: started with the first frame")
-        kept = load_journal(path, self.header) if resume and unfinished else ()
-        return Journal.start(path, self.header, kept), kept, notes
+        path = journal_of(output)
+        kept = load_journal(path, self.header) if resume and path.exists() else ()
+        return Journal.start(path, self.header, kept), kept
 
     @property
     def header(self) -> dict[str, Any]:

@@ -1,0 +1,51 @@
+"""The lens of a video that `mien track` is told nothing of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from mien.arrays import Array, UInt8
+from mien.capture.detector import LandmarkDetector
+from mien.capture.frames_ahead import frames_ahead
+from mien.capture.video import Video, VideoFacts
+from mien.model.head import Head
+from mien.track.face import TrackedFace
+from mien.track.focal import estimate_focal
+from mien.track.start import Starter
+from mien.track.tracker import TrackOptions
+
+if TYPE_CHECKING:
+    from mien.build import Progress
+
+LENS = "Finding the focal length"
+_FIRST, _EVERY, _SIDE = 300, 5, 1280
+"""Which frames are looked at, and how large: the detector sees no more in larger ones."""
+
+
+def find_focal(
+    clip: Video,
+    facts: VideoFacts,
+    head: Head,
+    options: TrackOptions,
+    detector: LandmarkDetector,
+    tell: Progress,
+) -> tuple[float, str]:
+    """Focal length of a clip's pictures in px, from the first of them, and a note on it.
+
+    Args:
+        tell: told LENS, the frames done and their total.
+    """
+    starter = Starter(head, TrackedFace(head, units=options.units).layout, detector)
+    found = estimate_focal(_first(clip, facts, tell), starter, head)
+    reduced = min(1.0, _SIDE / max(facts.width, facts.height))
+    return found.focal_px / reduced, found.note
+
+
+def _first(clip: Video, facts: VideoFacts, tell: Progress) -> Iterator[UInt8[Array, "h w 3"]]:
+    total = min(facts.frames or _FIRST, _FIRST)
+    with frames_ahead(clip, max_side=_SIDE) as pictures:
+        for picture in islice(pictures, 0, _FIRST, _EVERY):
+            yield picture.pixels
+            tell(LENS, min(picture.frame + _EVERY, total), total)
