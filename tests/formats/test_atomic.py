@@ -7,7 +7,12 @@ from pathlib import Path
 import pytest
 
 from mien.errors import InputError
-from mien.formats.atomic import atomic_file, atomic_folder, check_folder_place
+from mien.formats.atomic import (
+    atomic_file,
+    atomic_folder,
+    check_file_place,
+    check_folder_place,
+)
 
 
 def always(folder: Path) -> bool:
@@ -101,6 +106,17 @@ class TestFile:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         assert target.read_text() == "old"
         assert names(tmp_path) == ["result.txt"]
+
+    def test_a_place_is_checked_and_left_as_it_was(self, tmp_path: Path) -> None:
+        (tmp_path / "old").write_text("old")
+        for name in ("old", "new"):
+            check_file_place(tmp_path / name)
+        assert names(tmp_path) == ["old"]
+        assert (tmp_path / "old").read_text() == "old"
+        with pytest.raises(InputError, match="expected a file's name, got a folder"):
+            check_file_place(tmp_path)
+        with pytest.raises(InputError, match="expected a place that can be written to, got"):
+            check_file_place(tmp_path / "old" / "below")
 
     def test_errors_of_other_files_pass_through(self, tmp_path: Path) -> None:
         with pytest.raises(FileNotFoundError), atomic_file(tmp_path / "result"):
