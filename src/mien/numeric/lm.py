@@ -39,6 +39,7 @@ def minimize_lm(
     damping: float = 1e-3,
     max_iterations: int = 100,
     tolerance: float = 1e-10,
+    max_failures: int | None = None,
 ) -> LmResult[X]:
     """Goes downhill from x.
 
@@ -48,11 +49,13 @@ def minimize_lm(
             diagonal, solves for a step and predicts by how much the cost falls.
         move: x after a step; where rotations stay rotations.
         tolerance: relative fall of the cost, predicted and found, at which it has converged.
+        max_failures: steps in a row that may fail before it counts as converged, for those who
+            must be done in time; by default as many as it takes.
     Source: Nielsen, Damping parameter in Marquardt's method, 1999 (how damping follows the gain).
     """
     value, growth = cost(x), 2.0
     for iteration in range(1, max_iterations + 1):
-        solve = linearize(x)
+        solve, failures = linearize(x), 0
         while True:
             step, predicted = solve(damping)
             if not predicted > tolerance * value:
@@ -62,8 +65,8 @@ def minimize_lm(
             gain = (value - moved_value) / predicted
             if np.isfinite(moved_value) and gain > 0:
                 break
-            damping, growth = damping * growth, 2 * growth
-            if damping > _MAX_DAMPING:
+            damping, growth, failures = damping * growth, 2 * growth, failures + 1
+            if damping > _MAX_DAMPING or failures == max_failures:
                 return LmResult(x, value, iteration, True)
         damping = max(damping * max(1 / 3, 1 - (2 * gain - 1) ** 3), _MIN_DAMPING)
         growth, x, value = 2.0, moved, moved_value

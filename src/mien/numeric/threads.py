@@ -37,8 +37,9 @@ def for_row_bands(kernel: Callable[[int, int], object], rows: int, *, work: int)
     if threads == 1 or work < _SERIAL_WORK:
         kernel(0, rows)
         return
-    # More bands than threads: an image's busy rows are seldom spread evenly.
-    bands = min(rows, 4 * threads)
+    # More bands than threads: an image's busy rows are seldom spread evenly. Of little work, each
+    # band more would cost what it evens out.
+    bands = min(rows, threads * (4 if work > 20 * _SERIAL_WORK else 2))
     edges = [rows * band // bands for band in range(bands + 1)]
     tasks = [_pool(threads).submit(kernel, *edges[band : band + 2]) for band in range(bands)]
     for task in tasks:

@@ -1,4 +1,4 @@
-"""Band-pass filtered pictures of a face: colour differences between cameras drop out (P02 sec. 6.2).
+"""Band-pass filtered pictures of a face: another camera's colours drop out (P02 sec. 6.2).
 
 At one level of a pyramid, a picture less its own blur: what is finer than the level's pixels is
 gone already, what is coarser than the blur goes here. Only the face's own pixels are averaged, so
@@ -15,81 +15,91 @@ from mien.numeric.threads import for_row_bands
 
 
 def band_pass(
-    layers: Float[Array, "h w k 3"],
-    target: Float[Array, "h w 3"],
+    layers: Float[Array, "h w k"],
+    luma: Float[Array, "h w"],
+    target: Float[Array, "h w"],
     mask: Float[Array, "h w"],
     weights: Float[Array, "h w"],
     width: int,
-) -> tuple[Float[Array, "h w k 3"], Float[Array, "h w 3"]]:
-    """Layers and target less their means over the pixels around; 0 outside of the mask.
+) -> tuple[Float[Array, "h w k"], Float[Array, "h w"], Float[Array, "h w"]]:
+    """Layers, their mixture and the target, less their means over the pixels around.
+
+    The mixture is filtered itself, for where weights vary, mixed bands are no bands of a mixture.
 
     Args:
-        mask: (h, w) 0 or 1. weights: (h, w) of the pixels in the means.
+        mask: (h, w) 0 or 1; the bands are 0 outside. weights: (h, w) of pixels in the means.
         width: px, odd, side of the square whose mean goes.
     """
     import cv2
 
-    height, columns, count, _ = layers.shape
     # At the outline a frame's pixel mixes the face with what is behind it.
-    inner = cv2.erode(mask, np.ones((3, 3), np.uint8)) * weights
-    both = np.empty((height, columns, 3 * count + 4), np.float32)
+    inner = cv2.erode(mask, np.ones((3, 3), np.uint8))
+    inner *= weights
+    count = layers.shape[2]
+    weighted = np.empty((*mask.shape, count + 3), np.float32)
+    inputs = (layers, luma, target)
     for_row_bands(
-        lambda a, b: _stack_rows(layers, target, inner, a, b, both), height, work=both.size
+        lambda a, b: _weigh_rows(*inputs, inner, a, b, weighted), len(mask), work=weighted.size
     )
-    sums = cv2.blur(both, (width, width), borderType=cv2.BORDER_CONSTANT)
-    bands, band = np.empty_like(layers), np.empty_like(target)
+    sums = cv2.blur(weighted, (width, width), borderType=cv2.BORDER_CONSTANT)
+    bands = (np.empty_like(layers), np.empty_like(luma), np.empty_like(target))
     for_row_bands(
-        lambda a, b: _subtract_rows(layers, target, mask, sums, a, b, bands, band),
-        height,
-        work=both.size,
+        lambda a, b: _subtract_rows(*inputs, mask, sums, a, b, *bands),
+        len(mask),
+        work=weighted.size,
     )
-    return bands, band
+    return bands
 
 
 @njit(cache=True, nogil=True)
-def _stack_rows(
-    layers: Array, target: Array, inner: Array, first: int, end: int, both: Array
+def _weigh_rows(
+    layers: Array,
+    luma: Array,
+    target: Array,
+    inner: Array,
+    first: int,
+    end: int,
+    weighted: Array,
 ) -> None:
-    """Fill in layers, target and 1, all times the weights."""
-    last = both.shape[2] - 4
+    """Fill in layers, luma, target and 1, all times the weights."""
+    count = layers.shape[2]
     for row in range(first, end):
         for col in range(inner.shape[1]):
             weight = inner[row, col]
-            both[row, col, last + 3] = weight
-            if weight == 0.0:
-                both[row, col] = 0.0
-                continue
-            for c in range(3):
-                both[row, col, last + c] = weight * target[row, col, c]
-                for n in range(layers.shape[2]):
-                    both[row, col, 3 * n + c] = weight * layers[row, col, n, c]
+            for n in range(count):
+                weighted[row, col, n] = weight * layers[row, col, n]
+            weighted[row, col, count] = weight * luma[row, col]
+            weighted[row, col, count + 1] = weight * target[row, col]
+            weighted[row, col, count + 2] = weight
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _subtract_rows(
     layers: Array,
+    luma: Array,
     target: Array,
     mask: Array,
     sums: Array,
     first: int,
     end: int,
-    bands: Array,
-    band: Array,
+    layer_bands: Array,
+    luma_band: Array,
+    target_band: Array,
 ) -> None:
-    last = sums.shape[2] - 4
+    count = layers.shape[2]
     for row in range(first, end):
         for col in range(mask.shape[1]):
-            share = sums[row, col, last + 3]
-            if mask[row, col] == 0.0 or share < 1e-6:
-                bands[row, col] = 0.0
-                band[row, col] = 0.0
-                continue
-            inverse = np.float32(1.0) / share
-            for c in range(3):
-                band[row, col, c] = target[row, col, c] - sums[row, col, last + c] * inverse
-                for n in range(layers.shape[2]):
-                    mean = sums[row, col, 3 * n + c] * inverse
-                    bands[row, col, n, c] = layers[row, col, n, c] - mean
+            share = sums[row, col, count + 2]
+            shown = mask[row, col] > 0.0 and share > 1e-6
+            # Outside everything is 0: a picture and its mean alike.
+            inverse = np.float32(1.0) / share if shown else np.float32(0.0)
+            keep = np.float32(1.0) if shown else np.float32(0.0)
+            for n in range(count):
+                mean = sums[row, col, n] * inverse
+                layer_bands[row, col, n] = keep * layers[row, col, n] - mean
+            luma_band[row, col] = keep * luma[row, col] - sums[row, col, count] * inverse
+            mean = sums[row, col, count + 1] * inverse
+            target_band[row, col] = keep * target[row, col] - mean
 
 
 def odd(width: float) -> int:

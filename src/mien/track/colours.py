@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from mien.arrays import Array, Float
 from mien.track.bands import odd
+from mien.track.drawing import LUMA
 
 _GAIN_SD = 0.3
 _LIKE_PIXELS = 200.0
@@ -18,10 +21,35 @@ _PATCH = 0.1
 """Width over which differences are averaged, over the face's: what covers a face is no speck."""
 
 
+@dataclass(frozen=True)
+class Colours:
+    """How a frame's colours come from the drawn ones: frame = gain * drawn + bias, 0 to 255.
+
+    Attributes:
+        gain, bias: (3,).
+    """
+
+    gain: Float[Array, " 3"] = field(default_factory=lambda: np.ones(3))
+    bias: Float[Array, " 3"] = field(default_factory=lambda: np.zeros(3))
+
+    def applied(self, drawn: Float[Array, "h w 3"]) -> Float[Array, "h w 3"]:
+        """The drawn picture as the frame would have it."""
+        return np.asarray(drawn * self.gain + self.bias, np.float32)
+
+    def luma_before(self, pixels: Float[Array, "h w 3"]) -> Float[Array, "h w"]:
+        """Luma of a frame as the drawn picture would have it."""
+        import cv2
+
+        shares = np.array(LUMA) / self.gain
+        constant = float(shares @ self.bias)
+        luma = cv2.transform(pixels, np.array([[*shares, -constant]]))
+        return np.asarray(luma, np.float32)
+
+
 def match_colours(
     drawn: Float[Array, "h w 3"], target: Float[Array, "h w 3"], weights: Float[Array, "h w"]
-) -> tuple[Float[Array, " 3"], Float[Array, " 3"]]:
-    """Gain and bias, (3,) each, of least squares: target = gain * drawn + bias.
+) -> Colours:
+    """Gain and bias of least squares.
 
     A plain face hardly tells one from the other: gains are believed to be near 1.
     """
@@ -36,7 +64,7 @@ def match_colours(
     belief = np.minimum(noise / _GAIN_SD**2, variance) * _LIKE_PIXELS / total
     gain = (w @ (dx * dy) + belief) / (variance + belief)
     gain = np.clip(gain, 0.2, 5.0)
-    return gain, mean_y - gain * mean_x
+    return Colours(gain, mean_y - gain * mean_x)
 
 
 def pixel_weights(

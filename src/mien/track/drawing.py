@@ -10,11 +10,15 @@ from numba import njit
 
 from mien.arrays import Array, Bool, Float, Int
 from mien.expressions.state import PosedFace
-from mien.numeric.raster import rasterize
+from mien.numeric.raster import Raster, rasterize
 from mien.numeric.threads import for_row_bands
-from mien.render.mipmap import Pyramids, level_of_detail, place_lookup, weighted_texels
+from mien.render.mipmap import Four, Pyramids, level_of_detail, place_lookup, weighted_texels
 from mien.render.mix import Painted
 from mien.track.views import View
+
+LUMA = (0.299, 0.587, 0.114)
+"""Of red, green and blue (BT.601): faces are compared in shades of grey, which tells as much about
+them as their colours do at a third of the cost (docs/tracking.md)."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +43,8 @@ class Drawing(NamedTuple):
         barycentrics: (h, w, 3). depth: (h, w) mm.
         places: (V, 3) mm, camera space.
         mask: (h, w) float32, 1 where there is a triangle that is compared.
-        layers: (h, w, K, 3) float32, 0 to 255: each expression's rendering, on one geometry.
-        weights: (V, K) of the mixture.
+        layers: (h, w, K) float32, 0 to 255: luma of each expression's rendering, on one geometry.
+        luma: (h, w) float32: of their mixture, P02 eq. (5).
     """
 
     ids: Int[Array, "h w"]
@@ -48,8 +52,8 @@ class Drawing(NamedTuple):
     depth: Float[Array, "h w"]
     places: Float[Array, "v 3"]
     mask: Float[Array, "h w"]
-    layers: Float[Array, "h w k 3"]
-    weights: Float[Array, "v k"]
+    layers: Float[Array, "h w k"]
+    luma: Float[Array, "h w"]
 
 
 def draw(
@@ -59,45 +63,72 @@ def draw(
     pose: Pose,
     view: View,
     *,
-    layers: bool,
+    layers: bool = True,
 ) -> Drawing:
-    """The face as the view sees it.
+    """The face as the view sees it, in shades of grey.
 
     Args:
-        layers: keep every expression's rendering apart; otherwise their mixture alone, as one.
+        layers: keep every expression's rendering; otherwise there are 0 of them.
     """
+    places, ids, raster, shades = _placed(painted, face, pose, view)
+    height, width = ids.shape
+    count = face.weights.shape[1] if layers else 0
+    out, luma = np.zeros((height, width, count), np.float32), np.zeros((height, width), np.float32)
+    mask = np.empty((height, width), np.float32)
+    surface = (compared, painted.triangles, painted.uvs, painted.pyramids, shades)
+
+    def rows(first: int, end: int) -> None:
+        _shade_rows(ids, raster.barycentrics, *surface, first, end, mask, out, luma)
+
+    for_row_bands(rows, height, work=4 * width * height)
+    return Drawing(ids, raster.barycentrics, raster.depth, places, mask, out, luma)
+
+
+def draw_colours(
+    painted: Painted, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, view: View
+) -> tuple[Float[Array, "h w 3"], Float[Array, "h w"]]:
+    """The mixture in colour, 0 to 255, and where it is one of the compared triangles."""
+    _, ids, raster, shades = _placed(painted, face, pose, view)
+    height, width = ids.shape
+    out, mask = np.zeros((height, width, 3), np.float32), np.empty((height, width), np.float32)
+    surface = (compared, painted.triangles, painted.uvs, painted.pyramids, shades)
+    _colour_rows(ids, raster.barycentrics, *surface, mask, out)
+    return out, mask
+
+
+def _placed(
+    painted: Painted, face: PosedFace, pose: Pose, view: View
+) -> tuple[Float[Array, "v 3"], Int[Array, "h w"], Raster, Float[Array, "v s"]]:
+    """Vertices in camera space, what covers the pixels, and detail, brightness and weights."""
     width, height = view.size
     focal = view.focal * pose.zoom
     places = face.vertices @ pose.R.T + pose.t
     points = focal * places[:, :2] / places[:, 2:] + (view.cx, view.cy)
     raster = rasterize(points, places[:, 2], painted.triangles, width, height, cull=True)
+    shades = np.empty((len(points), 2 + face.weights.shape[1]), np.float32)
     # As sharp as a picture of four samples a pixel (render.mix).
-    detail = level_of_detail(painted.texels, points, painted.triangles) - 0.5
-    shades = np.column_stack([detail, face.brightness, face.weights]).astype(np.float32)
-    count = face.weights.shape[1] if layers else 1
-    out = np.zeros((height, width, count, 3), np.float32)
-    mask = np.empty((height, width), np.float32)
-    ids = raster.triangle_ids
+    shades[:, 0] = level_of_detail(painted.texels, points, painted.triangles) - 0.5
+    shades[:, 1], shades[:, 2:] = face.brightness, face.weights
+    return places, raster.triangle_ids, raster, shades
 
-    def rows(first: int, end: int) -> None:
-        _shade_rows(
-            ids,
-            raster.barycentrics,
-            compared,
-            painted.triangles,
-            painted.uvs,
-            painted.pyramids,
-            shades,
-            layers,
-            first,
-            end,
-            mask,
-            out,
-        )
 
-    for_row_bands(rows, height, work=8 * width * height)
-    weights = shades[:, 2:] if layers else np.ones((len(shades), 1), np.float32)
-    return Drawing(ids, raster.barycentrics, raster.depth, places, mask, out, weights)
+@njit(inline="always")
+def _lookup(
+    t: int,
+    b: tuple[float, float, float],
+    triangles: Array,
+    uvs: Array,
+    pyramids: Pyramids,
+    shades: Array,
+) -> tuple[Four, Four, float]:
+    """Texels and their weights for a place in a triangle, and its brightness."""
+    i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+    u = b[0] * uvs[t, 0, 0] + b[1] * uvs[t, 1, 0] + b[2] * uvs[t, 2, 0]
+    v = b[0] * uvs[t, 0, 1] + b[1] * uvs[t, 1, 1] + b[2] * uvs[t, 2, 1]
+    level = b[0] * shades[i, 0] + b[1] * shades[j, 0] + b[2] * shades[k, 0]
+    bright = b[0] * shades[i, 1] + b[1] * shades[j, 1] + b[2] * shades[k, 1]
+    fine, coarse = place_lookup(pyramids, u, v, level)
+    return fine, coarse, bright
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
@@ -109,14 +140,13 @@ def _shade_rows(
     uvs: Array,
     pyramids: Pyramids,
     shades: Array,
-    apart: bool,
     first: int,
     end: int,
     mask: Array,
     out: Array,
+    luma: Array,
 ) -> None:
-    """Fill in mask and out; ids that are not compared become -1."""
-    count = shades.shape[1] - 2
+    """Fill in mask, layers and luma; ids that are not compared become -1."""
     for row in range(first, end):
         for col in range(ids.shape[1]):
             t = ids[row, col]
@@ -125,24 +155,54 @@ def _shade_rows(
                 mask[row, col] = 0.0
                 continue
             mask[row, col] = 1.0
-            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
             b0 = barycentrics[row, col, 0]
             b1 = barycentrics[row, col, 1]
             b2 = barycentrics[row, col, 2]
-            u = b0 * uvs[t, 0, 0] + b1 * uvs[t, 1, 0] + b2 * uvs[t, 2, 0]
-            v = b0 * uvs[t, 0, 1] + b1 * uvs[t, 1, 1] + b2 * uvs[t, 2, 1]
-            level = b0 * shades[i, 0] + b1 * shades[j, 0] + b2 * shades[k, 0]
-            bright = b0 * shades[i, 1] + b1 * shades[j, 1] + b2 * shades[k, 1]
-            fine, coarse = place_lookup(pyramids, u, v, level)
-            for n in range(count):
-                weight = 1.0
-                if not apart:
-                    c = 2 + n
-                    weight = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]
-                    if weight == 0.0:
-                        continue
+            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            fine, coarse, bright = _lookup(t, (b0, b1, b2), triangles, uvs, pyramids, shades)
+            total = 0.0
+            for n in range(shades.shape[1] - 2):
+                c = 2 + n
+                weight = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]
+                if weight == 0.0 and out.shape[2] == 0:
+                    continue
                 red, green, blue = weighted_texels(pyramids.texels, n, fine, coarse)
-                place = n if apart else 0
-                out[row, col, place, 0] += bright * weight * red
-                out[row, col, place, 1] += bright * weight * green
-                out[row, col, place, 2] += bright * weight * blue
+                grey = bright * (LUMA[0] * red + LUMA[1] * green + LUMA[2] * blue)
+                total += weight * grey
+                if out.shape[2]:
+                    out[row, col, n] = grey
+            luma[row, col] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+def _colour_rows(
+    ids: Array,
+    barycentrics: Array,
+    compared: Array,
+    triangles: Array,
+    uvs: Array,
+    pyramids: Pyramids,
+    shades: Array,
+    mask: Array,
+    out: Array,
+) -> None:
+    for row in range(len(ids)):
+        for col in range(ids.shape[1]):
+            t = ids[row, col]
+            mask[row, col] = 0.0
+            if t < 0 or not compared[t]:
+                continue
+            mask[row, col] = 1.0
+            b0 = barycentrics[row, col, 0]
+            b1 = barycentrics[row, col, 1]
+            b2 = barycentrics[row, col, 2]
+            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            fine, coarse, bright = _lookup(t, (b0, b1, b2), triangles, uvs, pyramids, shades)
+            for n in range(shades.shape[1] - 2):
+                c = 2 + n
+                weight = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]
+                if weight != 0.0:
+                    red, green, blue = weighted_texels(pyramids.texels, n, fine, coarse)
+                    out[row, col, 0] += bright * weight * red
+                    out[row, col, 1] += bright * weight * green
+                    out[row, col, 2] += bright * weight * blue

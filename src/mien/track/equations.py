@@ -1,8 +1,8 @@
 """Normal equations of the residual, summed up pixel by pixel: J itself is never stored.
 
-The residual is eps(p) = 1/2 sum w rho(I_t - (gain I^ + bias)) of P02 sec. 6.1.2, with all three
-colours and a weight for each pixel, and a robust rho where P02 has the square; J = G + B of eq. (7), G by Sobel's gradient of the drawn picture
-and the chain rule through projection, rotation and shape (app. B), B by the pictures of the single
+The residual is eps(p) = 1/2 sum w rho(I_t - I^) of P02 sec. 6.1.2, with a weight for each
+pixel and a robust rho where P02 has the square; J = G + B of eq. (7), G by Sobel's gradient of the drawn
+picture and the chain rule through projection, rotation and shape (app. B), B by those of the single
 expressions. What eq. (7) leaves to the reader: at a pixel that stays, a picture that moves to the
 right brings what was to its left, so G takes the gradient with a minus.
 """
@@ -23,24 +23,21 @@ from mien.track.views import View
 _BLOCK = 8
 """Rows summed up together: the same sums, whatever the number of threads."""
 POSE_UNKNOWNS = 7
-"""Rotation vector (applied from the left, P02 app. B.2), translation mm, log of the focal length."""
+"""Rotation vector (applied from the left, P02 app. B.2), translation mm, log focal length."""
 
 
 class Comparison(NamedTuple):
     """A drawn picture beside the target.
 
     Attributes:
-        drawn, target: (h, w, 3) float32, plain or filtered alike.
+        drawn, target: (h, w) float32 luma, plain or filtered alike.
         weights: (h, w) float32 of the pixels.
-        gain, bias: (3,): target = gain * drawn + bias.
         scale: grey levels. Geman and McClure's: a pixel that is off by it counts a quarter.
     """
 
-    drawn: Float[Array, "h w 3"]
-    target: Float[Array, "h w 3"]
+    drawn: Float[Array, "h w"]
+    target: Float[Array, "h w"]
     weights: Float[Array, "h w"]
-    gain: Float[Array, " 3"]
-    bias: Float[Array, " 3"]
     scale: float
 
 
@@ -70,51 +67,13 @@ class Equations:
 
     Attributes:
         matrix: (N, N). vector: (N,), so that matrix @ step = vector lowers the residual.
-        squares: sum of w rho(r) over pixels and colours. weight: sum of w, over colours too.
+        squares: sum of w rho(r) over the pixels. weight: sum of w.
     """
 
     matrix: Float[Array, "n n"]
     vector: Float[Array, " n"]
     squares: float
     weight: float
-
-
-def mixture(drawing: Drawing, layers: Float[Array, "h w k 3"], triangles: Array) -> Array:
-    """(h, w, 3) P02 eq. (5): the sum of w_k I^_k, weights interpolated between vertices."""
-    if layers.shape[2] == 1:
-        return layers[:, :, 0]
-    height, width = drawing.ids.shape
-    out = np.zeros((height, width, 3), np.float32)
-    inputs = (drawing.ids, drawing.barycentrics, triangles, drawing.weights, layers)
-    for_row_bands(lambda a, b: _mix_rows(*inputs, a, b, out), height, work=height * width)
-    return out
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def _mix_rows(
-    ids: Array,
-    barycentrics: Array,
-    triangles: Array,
-    weights: Array,
-    layers: Array,
-    first: int,
-    end: int,
-    out: Array,
-) -> None:
-    for row in range(first, end):
-        for col in range(ids.shape[1]):
-            t = ids[row, col]
-            if t < 0:
-                continue
-            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            b0 = barycentrics[row, col, 0]
-            b1 = barycentrics[row, col, 1]
-            b2 = barycentrics[row, col, 2]
-            for n in range(weights.shape[1]):
-                weight = b0 * weights[i, n] + b1 * weights[j, n] + b2 * weights[k, n]
-                if weight != 0.0:
-                    for c in range(3):
-                        out[row, col, c] += weight * layers[row, col, n, c]
 
 
 def pose_equations(drawing: Drawing, comparison: Comparison, pose: Pose, view: View) -> Equations:
@@ -148,7 +107,7 @@ def pose_equations(drawing: Drawing, comparison: Comparison, pose: Pose, view: V
 
 def band_equations(
     drawing: Drawing,
-    layers: Float[Array, "h w k 3"],
+    layers: Float[Array, "h w k"],
     comparison: Comparison,
     flows: Float[Array, "v n 2"],
     answers: Answers,
@@ -190,7 +149,7 @@ def _summed(matrices: Array, vectors: Array, totals: Array) -> Equations:
     half = matrices.sum(axis=0)
     matrix = half + np.tril(half, -1).T
     squares, weight = totals.sum(axis=0).tolist()
-    return Equations(matrix, vectors.sum(axis=0), squares, 3 * weight)
+    return Equations(matrix, vectors.sum(axis=0), squares, weight)
 
 
 def screen_flows(
@@ -243,16 +202,14 @@ def _pose_flow(x: float, y: float, z: float, t: Array, focal: float, flow: Array
 
 
 @njit(inline="always")
-def _sobel(picture: Array, row: int, col: int, c: int) -> tuple[float, float]:
-    """How a channel changes at this pixel where the picture moves by a px: minus its gradient."""
+def _sobel(picture: Array, row: int, col: int) -> tuple[float, float]:
+    """How a picture changes at this pixel where the picture moves by a px: minus its gradient."""
     a, b = row - 1, row + 1
     left, right = col - 1, col + 1
-    corners_x = picture[a, right, c] + picture[b, right, c]
-    corners_x -= picture[a, left, c] + picture[b, left, c]
-    corners_y = picture[b, left, c] + picture[b, right, c]
-    corners_y -= picture[a, left, c] + picture[a, right, c]
-    x = corners_x + 2.0 * (picture[row, right, c] - picture[row, left, c])
-    y = corners_y + 2.0 * (picture[b, col, c] - picture[a, col, c])
+    x = picture[a, right] + picture[b, right] - picture[a, left] - picture[b, left]
+    y = picture[b, left] + picture[b, right] - picture[a, left] - picture[a, right]
+    x += 2.0 * (picture[row, right] - picture[row, left])
+    y += 2.0 * (picture[b, col] - picture[a, col])
     return -x / 8.0, -y / 8.0
 
 
@@ -284,34 +241,27 @@ def _add_pose(
     vector: Array,
     totals: Array,
 ) -> None:
-    drawn, target, weights, gain, bias, scale = comparison
+    drawn, target, weights, scale = comparison
     focal, cx, cy = lens
-    flow = np.empty((POSE_UNKNOWNS, 2))
+    flow, column = np.empty((POSE_UNKNOWNS, 2)), np.empty(POSE_UNKNOWNS)
     for row in range(first, end):
         for col in range(ids.shape[1]):
             weight = weights[row, col]
             if weight == 0.0 or not _whole(ids, row, col):
                 continue
-            squares, xx, xy, yy, xr, yr = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            for c in range(3):
-                r = target[row, col, c] - gain[c] * drawn[row, col, c] - bias[c]
-                squares += r * r
-                gx, gy = _sobel(drawn, row, col, c)
-                gx, gy = gx * gain[c], gy * gain[c]
-                xx, xy, yy = xx + gx * gx, xy + gx * gy, yy + gy * gy
-                xr, yr = xr + gx * r, yr + gy * r
+            r = target[row, col] - drawn[row, col]
+            gx, gy = _sobel(drawn, row, col)
             totals[1] += weight
-            trust = 1.0 / (1.0 + squares / (3.0 * scale * scale))
-            totals[0] += weight * trust * squares
+            trust = 1.0 / (1.0 + r * r / (scale * scale))
+            totals[0] += weight * trust * r * r
             weight *= trust * trust
             x, y = (col + 0.5 - cx) / focal, (row + 0.5 - cy) / focal
             _pose_flow(x, y, depth[row, col], t, focal, flow)
             for p in range(POSE_UNKNOWNS):
-                a = weight * (xx * flow[p, 0] + xy * flow[p, 1])
-                b = weight * (xy * flow[p, 0] + yy * flow[p, 1])
-                vector[p] += weight * (xr * flow[p, 0] + yr * flow[p, 1])
+                column[p] = gx * flow[p, 0] + gy * flow[p, 1]
+                vector[p] += weight * r * column[p]
                 for q in range(p + 1):
-                    matrix[p, q] += a * flow[q, 0] + b * flow[q, 1]
+                    matrix[p, q] += weight * column[p] * column[q]
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -328,28 +278,22 @@ def _add_bands(
     vector: Array,
     totals: Array,
 ) -> None:
-    drawn, target, weights, gain, bias, scale = comparison
+    drawn, target, weights, scale = comparison
     active, counts, region, direction, Q, masks, triangles = answers
-    columns = np.empty((active.shape[1], 3), np.float32)
-    along = np.empty((Q.shape[1], 3), np.float32)
+    columns = np.empty(active.shape[1], np.float32)
+    along = np.empty(Q.shape[1], np.float32)
     shares = np.empty(masks.shape[1], np.float32)
-    residual, gx, gy = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
     for row in range(first, end):
         for col in range(ids.shape[1]):
             weight = weights[row, col]
             if weight == 0.0 or not _whole(ids, row, col):
                 continue
             t = ids[row, col]
-            squares = np.float32(0.0)
-            for c in range(3):
-                r = target[row, col, c] - gain[c] * drawn[row, col, c] - bias[c]
-                residual[c] = r
-                squares += r * r
-                x, y = _sobel(drawn, row, col, c)
-                gx[c], gy[c] = gain[c] * x, gain[c] * y
+            r = target[row, col] - drawn[row, col]
+            gx, gy = _sobel(drawn, row, col)
             totals[1] += weight
-            trust = 1.0 / (1.0 + squares / (3.0 * scale * scale))
-            totals[0] += weight * trust * squares
+            trust = 1.0 / (1.0 + r * r / (scale * scale))
+            totals[0] += weight * trust * r * r
             weight *= trust * trust
             i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
             b0 = barycentrics[row, col, 0]
@@ -357,25 +301,21 @@ def _add_bands(
             b2 = barycentrics[row, col, 2]
             # Eq. (7)'s sum over k of dw_k/dp I^_k, but for the region's share.
             for d in range(Q.shape[1]):
-                for c in range(3):
-                    total = np.float32(0.0)
-                    for n in range(Q.shape[0]):
-                        total += Q[n, d] * layers[row, col, n, c]
-                    along[d, c] = total * gain[c]
+                along[d] = 0.0
+                for n in range(Q.shape[0]):
+                    along[d] += Q[n, d] * layers[row, col, n]
             for n in range(masks.shape[1]):
                 shares[n] = b0 * masks[i, n] + b1 * masks[j, n] + b2 * masks[k, n]
             for a in range(counts[t]):
                 p = active[t, a]
                 x = b0 * flows[i, p, 0] + b1 * flows[j, p, 0] + b2 * flows[k, p, 0]
                 y = b0 * flows[i, p, 1] + b1 * flows[j, p, 1] + b2 * flows[k, p, 1]
-                for c in range(3):
-                    columns[a, c] = gx[c] * x + gy[c] * y
-                    if region[p] >= 0:
-                        columns[a, c] += shares[region[p]] * along[direction[p], c]
+                columns[a] = gx * x + gy * y
+                if region[p] >= 0:
+                    columns[a] += shares[region[p]] * along[direction[p]]
             for a in range(counts[t]):
                 p = active[t, a]
-                c0, c1, c2 = weight * columns[a, 0], weight * columns[a, 1], weight * columns[a, 2]
-                vector[p] += c0 * residual[0] + c1 * residual[1] + c2 * residual[2]
+                own = weight * columns[a]
+                vector[p] += own * r
                 for b in range(a + 1):
-                    product = c0 * columns[b, 0] + c1 * columns[b, 1] + c2 * columns[b, 2]
-                    matrix[p, active[t, b]] += product
+                    matrix[p, active[t, b]] += own * columns[b]

@@ -8,8 +8,8 @@ import numpy as np
 
 from mien.arrays import Array, Float, UInt8
 from mien.camera import Camera
-from mien.track.colours import match_colours, pixel_weights, usual_difference
-from mien.track.drawing import Pose
+from mien.track.colours import Colours, match_colours, pixel_weights, usual_difference
+from mien.track.drawing import Pose, draw_colours
 from mien.track.equations import POSE_UNKNOWNS
 from mien.track.face import Anchor, TrackedFace
 from mien.track.phases import (
@@ -24,22 +24,25 @@ from mien.track.phases import (
 )
 from mien.track.views import View, cut_views
 
+_FIRST_SCALE = 40.0
+"""Grey levels by which a pixel may be off before anything is fitted."""
+
 
 @dataclass(frozen=True)
 class FitOptions:
     """How a frame is fitted; the defaults are what works best in real time.
 
     Attributes:
-        face_px: width at which the face is compared; smaller ones stay as they are.
-        levels: sizes of the picture, each half of the one before.
-        iterations: at most, in each phase.
+        face_px: extent at which the face is compared; smaller ones stay as they are.
+        levels: sizes of the picture, each half of the one before; 2 at least.
+        iterations: at most, in each phase; fewer on the finest size.
         tolerance: relative fall of the cost at which a phase ends.
     """
 
-    face_px: float = 160.0
+    face_px: float = 150.0
     levels: int = 3
-    iterations: int = 4
-    tolerance: float = 1e-4
+    iterations: int = 3
+    tolerance: float = 1e-3
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,7 @@ class Fitted:
 
     Attributes:
         guess: of least cost. deviations: (N,) of its unknowns.
-        gain, bias: (3,) frame = gain * drawn + bias.
+        colours: of the frame over the drawn ones.
         rms: grey levels, over the pixels that count.
         seen: their share of the face.
         likeness: correlation of frame and drawn face over them, from -1 to 1.
@@ -56,8 +59,7 @@ class Fitted:
 
     guess: Guess
     deviations: Float[Array, " n"]
-    gain: Float[Array, " 3"]
-    bias: Float[Array, " 3"]
+    colours: Colours
     rms: float
     seen: float
     likeness: float
@@ -72,21 +74,28 @@ class FrameFit:
 
     def __init__(self, model: TrackedFace, options: FitOptions) -> None:
         self.model, self.options = model, options
-        count = POSE_UNKNOWNS + len(model.neutral.vector)
-        pose = np.arange(count) < POSE_UNKNOWNS - 1
-        face = np.arange(count) >= POSE_UNKNOWNS
-        self._pose, self._face, self._both = pose, face, pose | face
-        triangles = model.painted.triangles[model.compared]
-        self._outline = np.unique(triangles)
+        unknowns = np.arange(POSE_UNKNOWNS + len(model.neutral.vector))
+        self._pose = unknowns < POSE_UNKNOWNS - 1
+        self._both = unknowns != POSE_UNKNOWNS - 1
+        self._outline = np.unique(model.painted.triangles[model.compared])
 
     def fit(
-        self, pixels: UInt8[Array, "h w 3"], camera: Camera, start: Guess, belief: Belief
+        self,
+        pixels: UInt8[Array, "h w 3"],
+        camera: Camera,
+        start: Guess,
+        belief: Belief,
+        colours: Colours,
     ) -> Fitted | None:
         """The frame's own guess, from a start that is near.
 
+        Pose alone first, on the smallest picture, then pose and face together: what an expression
+        does to the picture, a motion of the head does in part, and one after the other they would
+        approach the truth in many small steps.
+
         Args:
             camera: of the frame, its lens; the pose in it does not matter.
-            belief: what is expected.
+            belief: what is expected. colours: of the frame, as far as known.
         Returns: None where the start shows no face in the frame.
         """
         anchor = self.model.anchored(start.face)
@@ -94,25 +103,35 @@ class FrameFit:
         if found is None:
             return None
         views, face_px = found
-        guess, answer, scene = start, None, None
-        for level in reversed(range(len(views))):
-            scene = self._scene(anchor, views[level], guess, face_px / 2**level)
-            if scene is None:
-                return None
-            guess = self._solved(scene, guess, belief, by_plain_pictures, self._pose).guess
-            answer = self._solved(
-                scene, guess, belief, by_bands, self._face if level else self._both
-            )
-            guess = answer.guess
-            anchor = self.model.anchored(guess.face)
-        scene = self._scene(anchor, views[0], guess, face_px)
-        if scene is None:
+        least = 2 ** (len(views) - 1)
+        smallest = views[-1]
+        target, weights = colours.luma_before(smallest.pixels), smallest.inside
+        scene = Scene(self.model, anchor, smallest, target, weights, _FIRST_SCALE, face_px / least)
+        guess = self._solved(scene, start, belief, by_plain_pictures, self._pose).guess
+        guess = self._solved(scene, guess, belief, by_bands, self._both).guess
+        told = self._told(scene, guess)
+        if told is None:
             return None
-        return _fitted(scene, answer)
+        colours, weights, scale, seen = told
+        for level in reversed(range(len(views) - 1)):
+            view = views[level]
+            scene = Scene(
+                self.model,
+                anchor,
+                view,
+                colours.luma_before(view.pixels),
+                _enlarged(weights, view),
+                scale,
+                face_px / 2**level,
+            )
+            answer = self._solved(scene, guess, belief, by_bands, self._both)
+            guess = answer.guess
+        return Fitted(guess, answer.deviations, colours, answer.rms, seen, _likeness(scene, answer))
 
     def _views(
         self, pixels: Array, camera: Camera, pose: Pose, anchor: Anchor
     ) -> tuple[list[View], float] | None:
+        """The frame cut out around the face, and the face's extent in the largest, px."""
         seen_from = replace(camera, R_cam_head=pose.R, t_cam_head=pose.t)
         outline = anchor.face.vertices[self._outline]
         if seen_from.to_camera(outline)[:, 2].min() <= 1:
@@ -122,28 +141,28 @@ class FrameFit:
         extent = float(np.ptp(points, axis=0).max())
         if inside.mean() < 0.25 or not 16 < extent < 20 * max(camera.width, camera.height):
             return None
-        options = self.options
-        views = cut_views(
-            pixels, camera, points, face_px=1.25 * options.face_px, levels=options.levels
-        )
+        face_px, levels = self.options.face_px, self.options.levels
+        views = cut_views(pixels, camera, points, face_px=face_px, levels=levels)
         return views, extent * views[0].focal / camera.focal_px
 
-    def _scene(self, anchor: Anchor, view: View, guess: Guess, face_px: float) -> Scene | None:
-        """Colours, and which pixels to believe, at a guess."""
-        plain = Scene(self.model, anchor, view, np.ones(3), np.zeros(3), view.inside, 20.0, face_px)
-        drawing = plain.draw(guess, layers=False)
-        mask = drawing.mask * view.inside
+    def _told(self, scene: Scene, guess: Guess) -> tuple[Colours, Array, float, float] | None:
+        """Colours, pixels' weights, scale and share of the face that is seen, of a rough guess."""
+        model, view = self.model, scene.view
+        face = model.posed(scene.anchor, guess.face)
+        drawn, shown = draw_colours(model.painted, model.compared, face, guess.pose, view)
+        mask = shown * view.inside
         if mask.sum() < 50:
             return None
-        drawn, weights = drawing.layers[:, :, 0], mask
+        weights = mask
         for _ in range(2):
-            gain, bias = match_colours(drawn, view.pixels, weights)
-            matched = np.asarray(drawn * gain + bias, np.float32)
-            weights = pixel_weights(matched, view.pixels, mask, face_px=face_px)
+            colours = match_colours(drawn, view.pixels, weights)
+            matched = colours.applied(drawn)
+            weights = pixel_weights(matched, view.pixels, mask, face_px=scene.face_px)
         scale = usual_difference(matched, view.pixels, weights)
+        seen = float(weights.sum() / max(shown.sum(), 1.0))
         # Where the face comes in a little later there is no reason to distrust.
-        weights = np.where(drawing.mask > 0, weights, view.inside)
-        return replace(plain, gain=gain, bias=bias, weights=np.float32(weights), scale=scale)
+        believed = np.where(shown > 0, weights, view.inside).astype(np.float32)
+        return colours, believed, scale, seen
 
     def _solved(
         self, scene: Scene, guess: Guess, belief: Belief, linearized: Linearize, free: Array
@@ -159,29 +178,20 @@ class FrameFit:
         )
 
 
-def _fitted(scene: Scene, answer: Answer) -> Fitted:
-    """How well the frame is explained."""
-    drawing = scene.draw(answer.guess, layers=False)
-    mask = drawing.mask * scene.view.inside
-    weights = scene.weights * mask
-    chosen = weights > 0.25
-    matched = drawing.layers[:, :, 0] * scene.gain + scene.bias
-    difference = (scene.view.pixels - matched)[chosen]
-    rms = float(np.sqrt((difference**2).mean())) if len(difference) else np.inf
-    return Fitted(
-        answer.guess,
-        answer.deviations,
-        scene.gain,
-        scene.bias,
-        rms,
-        float(weights.sum() / max(drawing.mask.sum(), 1.0)),
-        _correlation(matched[chosen], scene.view.pixels[chosen]),
-    )
+def _enlarged(weights: Float[Array, "h w"], view: View) -> Float[Array, "h w"]:
+    """Weights of a smaller size for a larger one; 0 beyond the frame's borders."""
+    import cv2
+
+    larger = cv2.resize(weights, view.size, interpolation=cv2.INTER_LINEAR)
+    larger *= view.inside
+    return np.asarray(larger)
 
 
-def _correlation(a: Array, b: Array) -> float:
-    if len(a) < 2:
+def _likeness(scene: Scene, answer: Answer) -> float:
+    """Correlation of the frame and the drawn face over the pixels that count."""
+    chosen = (scene.weights * answer.drawing.mask) > 0.25
+    if np.count_nonzero(chosen) < 2:
         return 0.0
-    a, b = a.mean(axis=1), b.mean(axis=1)
+    a, b = answer.drawing.luma[chosen], scene.target[chosen]
     a, b = a - a.mean(), b - b.mean()
     return float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9))

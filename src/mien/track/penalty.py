@@ -10,7 +10,7 @@ from mien.arrays import Array, Float
 
 
 class Penalty(NamedTuple):
-    """D at one place.
+    """D by parameters of which weights are linear functions, w = directions a + w*.
 
     Attributes:
         value: >= 0. gradient: (N,). hessian: (N, N).
@@ -21,13 +21,14 @@ class Penalty(NamedTuple):
     hessian: Float[Array, "n n"]
 
 
-def range_penalty(weights: Float[Array, " k"], c: float) -> Penalty:
-    """c times the sum of min(0, w)^2 + max(0, w - 1)^2, by the weights themselves."""
+def range_penalty(
+    weights: Float[Array, " k"], c: float, directions: Float[Array, "k n"]
+) -> Penalty | None:
+    """c times the sum of min(0, w)^2 + max(0, w - 1)^2; None where all are in range: no penalty."""
     beyond = np.minimum(weights, 0) + np.maximum(weights - 1, 0)
-    outside = np.diag((beyond != 0).astype(np.float64))
-    return Penalty(float(c * (beyond**2).sum()), 2 * c * beyond, 2 * c * outside)
-
-
-def by_parameters(penalty: Penalty, Q: Float[Array, "k l"]) -> Penalty:
-    """The same by expression parameters, w = Q alpha + w*."""
-    return Penalty(penalty.value, Q.T @ penalty.gradient, Q.T @ penalty.hessian @ Q)
+    outside = beyond != 0
+    if not outside.any():
+        return None
+    pressed = directions[outside]
+    gradient = 2 * c * beyond[outside] @ pressed
+    return Penalty(float(c * beyond @ beyond), gradient, 2 * c * pressed.T @ pressed)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from mien.arrays import Array, Bool, Float
 from mien.numeric.lm import minimize_lm
-from mien.numeric.rotation import rotation_from_vector, rotation_to_vector
 from mien.track.bands import band_pass, odd
 from mien.track.drawing import Drawing, Pose, draw
 from mien.track.equations import (
@@ -17,12 +17,11 @@ from mien.track.equations import (
     Comparison,
     Equations,
     band_equations,
-    mixture,
     pose_equations,
     screen_flows,
 )
 from mien.track.face import Anchor, FaceParameters, TrackedFace
-from mien.track.penalty import by_parameters, range_penalty
+from mien.track.penalty import range_penalty
 from mien.track.views import View
 
 BAND = 0.2
@@ -44,14 +43,19 @@ class Guess:
 
     def moved(self, step: Float[Array, " n"]) -> Guess:
         """After a step in all unknowns: R <- R^ R (P02 app. B.2), everything else by addition."""
-        turned = rotation_from_vector(step[:3]) @ self.pose.R
+        import cv2
+
+        turned = cv2.Rodrigues(np.asarray(step[:3]))[0] @ self.pose.R
         zoom = self.pose.zoom * float(np.exp(step[6]))
         pose = Pose(turned, self.pose.t + step[3:6], zoom)
         return Guess(pose, self.face.moved(step[POSE_UNKNOWNS:]))
 
     def since(self, other: Guess) -> Float[Array, " n"]:
         """The step that leads here from another."""
-        turn = rotation_to_vector(self.pose.R @ other.pose.R.T)
+        import cv2
+
+        # Never near a half turn, where this is less exact than numeric.rotation, and far quicker.
+        turn = cv2.Rodrigues(self.pose.R @ other.pose.R.T)[0].ravel()
         zoom = np.log(self.pose.zoom / other.pose.zoom)
         face = self.face.vector - other.face.vector
         return np.concatenate([turn, self.pose.t - other.pose.t, [zoom], face])
@@ -76,7 +80,7 @@ class Scene:
 
     Attributes:
         anchor: the face around which the model is linear.
-        gain, bias: (3,) of the frame's colours over the drawn ones'.
+        target: (h, w) float32 luma of the frame, as the colours of the head's photos would be.
         weights: (h, w) of the pixels.
         scale: grey levels by which a pixel may be off and still count.
         face_px: width of the face in this size.
@@ -85,8 +89,7 @@ class Scene:
     model: TrackedFace
     anchor: Anchor
     view: View
-    gain: Float[Array, " 3"]
-    bias: Float[Array, " 3"]
+    target: Float[Array, "h w"]
     weights: Float[Array, "h w"]
     scale: float
     face_px: float
@@ -97,11 +100,6 @@ class Scene:
         painted, compared = self.model.painted, self.model.compared
         return draw(painted, compared, face, guess.pose, self.view, layers=layers)
 
-    def filtered(self, drawing: Drawing) -> tuple[Float[Array, "h w k 3"], Float[Array, "h w 3"]]:
-        """The drawing's layers and the frame, band-pass filtered over the face alone."""
-        width = odd(BAND * self.face_px)
-        return band_pass(drawing.layers, self.view.pixels, drawing.mask, self.weights, width)
-
 
 Linearize = Callable[[Scene, Guess], tuple[Equations, Drawing]]
 
@@ -109,14 +107,8 @@ Linearize = Callable[[Scene, Guess], tuple[Equations, Drawing]]
 def by_plain_pictures(scene: Scene, guess: Guess) -> tuple[Equations, Drawing]:
     """Equations of the pose alone, analytic; rows of the face's parameters are 0."""
     drawing = scene.draw(guess, layers=False)
-    comparison = Comparison(
-        drawing.layers[:, :, 0],
-        scene.view.pixels,
-        scene.weights * drawing.mask,
-        scene.gain,
-        scene.bias,
-        scene.scale,
-    )
+    weights = scene.weights * drawing.mask
+    comparison = Comparison(drawing.luma, scene.target, weights, scene.scale)
     found = pose_equations(drawing, comparison, guess.pose, scene.view)
     count = POSE_UNKNOWNS + len(guess.face.vector)
     matrix, vector = np.zeros((count, count)), np.zeros(count)
@@ -125,25 +117,19 @@ def by_plain_pictures(scene: Scene, guess: Guess) -> tuple[Equations, Drawing]:
     return Equations(matrix, vector, found.squares, found.weight), drawing
 
 
-def by_plain(scene: Scene, guess: Guess) -> tuple[Equations, Drawing]:
-    model = scene.model
-    drawing = scene.draw(guess, layers=True)
-    layers, target = drawing.layers, scene.view.pixels
-    drawn = mixture(drawing, layers, model.painted.triangles)
-    weights = scene.weights * drawing.mask
-    comparison = Comparison(drawn, target, weights, scene.gain, scene.bias, scene.scale)
-    flows = screen_flows(model.moves, drawing.places, guess.pose, scene.view)
-    return band_equations(drawing, layers, comparison, flows, model.answers), drawing
-
-
 def by_bands(scene: Scene, guess: Guess) -> tuple[Equations, Drawing]:
     """Equations of pose and face, analytic, over band-pass filtered pictures."""
     model = scene.model
     drawing = scene.draw(guess, layers=True)
-    layers, target = scene.filtered(drawing)
-    drawn = mixture(drawing, layers, model.painted.triangles)
-    weights = scene.weights * drawing.mask
-    comparison = Comparison(drawn, target, weights, scene.gain, np.zeros(3), scene.scale)
+    layers, drawn, target = band_pass(
+        drawing.layers,
+        drawing.luma,
+        scene.target,
+        drawing.mask,
+        scene.weights,
+        odd(BAND * scene.face_px),
+    )
+    comparison = Comparison(drawn, target, scene.weights * drawing.mask, scene.scale)
     flows = screen_flows(model.moves, drawing.places, guess.pose, scene.view)
     return band_equations(drawing, layers, comparison, flows, model.answers), drawing
 
@@ -187,13 +173,13 @@ def solve(
         iterations, tolerance: where to stop (numeric.lm).
     """
     # The last two only: the loop goes back to the one before when a step fails.
-    seen: dict[int, tuple[Guess, Equations, Drawing]] = {}
+    seen: dict[int, tuple[Guess, Equations, Drawing, _Prior]] = {}
 
-    def at(x: Guess) -> tuple[Guess, Equations, Drawing]:
+    def at(x: Guess) -> tuple[Guess, Equations, Drawing, _Prior]:
         if id(x) not in seen:
             while len(seen) > 1:
                 del seen[next(iter(seen))]
-            seen[id(x)] = (x, *linearized(scene, x))
+            seen[id(x)] = (x, *linearized(scene, x), _prior(scene.model, x, belief))
         return seen[id(x)]
 
     first = at(guess)[1]
@@ -204,15 +190,14 @@ def solve(
         return SAY / noise * first.weight / max(found.weight, 1e-9)
 
     def cost(x: Guess) -> float:
-        found = at(x)[1]
-        return scale(found) * found.squares / 2 + _prior(scene.model, x, belief)[0]
+        _, found, _, prior = at(x)
+        return scale(found) * found.squares / 2 + prior.value
 
     def normal(x: Guess) -> tuple[Array, Array]:
-        found = at(x)[1]
-        _, gradient, hessian = _prior(scene.model, x, belief)
+        _, found, _, prior = at(x)
         factor = scale(found)
-        matrix = (factor * found.matrix + hessian)[np.ix_(free, free)]
-        return matrix, (factor * found.vector - gradient)[free]
+        matrix = (factor * found.matrix + prior.hessian)[np.ix_(free, free)]
+        return matrix, (factor * found.vector - prior.gradient)[free]
 
     def linearize(x: Guess) -> Callable[[float], tuple[Array, float]]:
         matrix, downhill = normal(x)
@@ -233,27 +218,40 @@ def solve(
         move=Guess.moved,
         max_iterations=iterations,
         tolerance=tolerance,
+        max_failures=1,
     )
-    _, found, drawing = at(result.x)
+    _, found, drawing, _ = at(result.x)
     deviations = belief.deviations.copy()
     deviations[free] = np.sqrt(np.diag(np.linalg.inv(normal(result.x)[0])))
     rms = float(np.sqrt(found.squares / max(found.weight, 1e-9)))
     return Answer(result.x, deviations, drawing, result.iterations, rms)
 
 
-def _prior(model: TrackedFace, guess: Guess, belief: Belief) -> tuple[float, Array, Array]:
-    """Belief and D(p): value, gradient and Hessian."""
+class _Prior(NamedTuple):
+    """Belief and D(p) at a guess.
+
+    Attributes:
+        value: >= 0. gradient: (N,). hessian: (N, N).
+    """
+
+    value: float
+    gradient: Float[Array, " n"]
+    hessian: Float[Array, "n n"]
+
+
+def _prior(model: TrackedFace, guess: Guess, belief: Belief) -> _Prior:
     away, precision = guess.since(belief.mean), belief.deviations**-2.0
     value, gradient, hessian = float(precision @ away**2) / 2, precision * away, np.diag(precision)
     Q = model.basis.Q
-    start = POSE_UNKNOWNS
     rows = [(row, Q) for row in model.basis.weights(guess.face.alpha)]
     rows.append((guess.face.units, np.eye(len(guess.face.units))))
+    start = POSE_UNKNOWNS
     for weights, directions in rows:
-        limits = by_parameters(range_penalty(weights, LIMIT), directions)
         own = slice(start, start + directions.shape[1])
-        value += limits.value
-        gradient[own] += limits.gradient
-        hessian[own, own] += limits.hessian
         start = own.stop
-    return value, gradient, hessian
+        limits = range_penalty(weights, LIMIT, directions)
+        if limits is not None:
+            value += limits.value
+            gradient[own] += limits.gradient
+            hessian[own, own] += limits.hessian
+    return _Prior(value, gradient, hessian)

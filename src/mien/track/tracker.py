@@ -12,6 +12,7 @@ from mien.camera import Camera
 from mien.capture.detector import LandmarkDetector
 from mien.model.head import Head
 from mien.numeric.rotation import rotation_from_vector, rotation_to_vector
+from mien.track.colours import Colours
 from mien.track.drawing import Pose
 from mien.track.equations import POSE_UNKNOWNS
 from mien.track.face import FaceParameters, TrackedFace
@@ -104,7 +105,8 @@ class Tracker:
         guess = self._predicted(time)
         elapsed = max(time - self._past[-1].time, 1e-3) / _USUAL_STEP
         belief = Belief(guess, self._deviations(min(np.sqrt(elapsed), 3.0)))
-        return _if_like(self._fit.fit(pixels, camera, guess, belief))
+        colours = Colours(self._past[-1].gain, self._past[-1].bias)
+        return _if_like(self._fit.fit(pixels, camera, guess, belief, colours))
 
     def _found(self, pixels: Array, camera: Camera) -> Fitted | None:
         """By the detector; None where it finds no face, or another's."""
@@ -114,11 +116,11 @@ class Tracker:
         guess = self._guess(state)
         # Twice: the detector's landmarks are some millimetres off.
         belief = Belief(guess, self._deviations(1.5))
-        first = self._fit.fit(pixels, camera, guess, belief)
+        first = self._fit.fit(pixels, camera, guess, belief, Colours())
         if first is None:
             return None
         belief = replace(belief, mean=first.guess)
-        return _if_like(self._fit.fit(pixels, camera, first.guess, belief))
+        return _if_like(self._fit.fit(pixels, camera, first.guess, belief, first.colours))
 
     def _deviations(self, factor: float) -> Float[Array, " n"]:
         face = [_WEIGHT_DEVIATION] * self._model.neutral.alpha.size
@@ -158,8 +160,8 @@ class Tracker:
             fitted.rms,
             fitted.seen,
             self._channel_deviations(fitted.deviations[POSE_UNKNOWNS:]),
-            fitted.gain,
-            fitted.bias,
+            fitted.colours.gain,
+            fitted.colours.bias,
         )
 
     def _channel_deviations(self, deviations: Array) -> Float[Array, " c"]:
