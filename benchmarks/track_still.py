@@ -110,7 +110,7 @@ def jitter(
     Args:
         still: frames that count, if they and both neighbours are there.
     """
-    lost = np.isnan(translations).any(axis=1)
+    lost = np.isnan(translations.sum(axis=1))
     middle = np.flatnonzero(still & ~lost)
     middle = middle[(middle > 0) & (middle < len(still) - 1)]
     middle = middle[~lost[middle - 1] & ~lost[middle + 1]]
