@@ -1,0 +1,144 @@
+"""Real tracking of a head that is known, through clips as cameras and phones write them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mien.app.track_run
+from filmed import flagged, written
+from mien.animate.tracked import FACING
+from mien.app.track import Tracked, track_video
+from mien.app.track_files import TrackFiles
+from mien.app.track_run import digest, mean_rate
+from mien.arrays import Array
+from mien.camera import Camera
+from mien.expressions.state import FaceState
+from mien.formats.head_folder import load_head
+from mien.formats.track_csv import load_track
+from mien.model.head import Head
+from mien.numeric.rotation import angle_between, rotation_from_vector
+from mien.render.picture import HeadRenderer
+from mien.track.state import Track, TrackedFrame
+from mien.track.tracker import Tracker
+from posable import head as other_head
+
+WIDTH, HEIGHT, FOCAL = 240, 288, 420.0
+WITH_FACE = (0, 1, 2, 4, 5, 27, 28, 30)
+"""When the camera sees it, in tenths of a second; there is nobody for two seconds."""
+TIMES = (*WITH_FACE[:5], *range(6, 27), *WITH_FACE[5:])
+LENS = f"{FOCAL}px"
+
+
+@dataclass(frozen=True)
+class Filmed:
+    """A clip of a head whose places are known, and its track."""
+
+    head: Head
+    frames: list[Array]
+    track: Track
+    tracked: Tracked
+
+
+def camera_at(tenths: int) -> Camera:
+    """That sees the head turn steadily and come nearer."""
+    turn = rotation_from_vector(np.array([0.02, np.radians(tenths - 15), 0.03]))
+    place = np.array([tenths - 10.0, 20.0, 480.0 - tenths])
+    return Camera(WIDTH, HEIGHT, FOCAL, FACING @ turn, place)
+
+
+def film(head: Head) -> list[Array]:
+    renderer = HeadRenderer(head)
+    wall = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
+    wall[:, ::24] = 140
+    frames = []
+    for tenths in TIMES:
+        picture = wall
+        if tenths in WITH_FACE:
+            picture = renderer.draw(FaceState(), camera_at(tenths), background=wall)[..., :3]
+        frames.append(picture)
+    return frames
+
+
+@pytest.fixture(scope="module")
+def filmed(expressive: Path, tmp_path_factory: pytest.TempPathFactory) -> Filmed:
+    place = tmp_path_factory.mktemp("filmed")
+    head = load_head(expressive)
+    frames = film(head)
+    clip = written(place / "a.mp4", frames, TIMES)
+    tracked = track_video(clip, head, TrackFiles(place / "t.csv"), lens=LENS)
+    return Filmed(head, frames, load_track(place / "t.csv"), tracked)
+
+
+def test_found_again_after_two_seconds_without_a_face(filmed: Filmed) -> None:
+    statuses = [frame.status for frame in filmed.track.frames]
+    assert statuses == ["ok"] * 5 + ["lost"] * 21 + ["reacquired"] + ["ok"] * 2
+    assert filmed.tracked.counts == {"ok": 7, "reacquired": 1, "lost": 21}
+    assert "the face is lost in 21 of 29 frames, at 0.60 s first" in filmed.tracked.notes
+
+
+def test_poses_at_a_variable_rate(filmed: Filmed) -> None:
+    for frame, tenths in zip(filmed.track.frames, TIMES, strict=True):
+        assert frame.time == pytest.approx(tenths / 10)
+        assert (frame.state is not None) == (tenths in WITH_FACE)
+        if frame.state is not None:
+            true = camera_at(tenths)
+            turned = np.degrees(angle_between(frame.state.R_cam_head, true.R_cam_head))
+            assert turned < 1
+            off = np.linalg.norm(frame.state.t_cam_head - true.t_cam_head)
+            assert off < 0.01 * true.t_cam_head[2]
+    assert filmed.track.fps == pytest.approx(28 / 3.0)
+
+
+def test_a_clip_to_be_turned_gives_the_same_poses(filmed: Filmed, tmp_path: Path) -> None:
+    stored = [np.rot90(picture, -1) for picture in filmed.frames[:4]]
+    clip = flagged(written(tmp_path / "a.mp4", stored, TIMES), 1)
+    track_video(clip, filmed.head, TrackFiles(tmp_path / "t.csv"), lens=LENS)
+    found = load_track(tmp_path / "t.csv")
+    assert (found.width, found.height) == (WIDTH, HEIGHT)
+    for frame, upright in zip(found.frames, filmed.track.frames, strict=False):
+        assert frame.state is not None
+        assert upright.state is not None
+        turned = np.degrees(angle_between(frame.state.R_cam_head, upright.state.R_cam_head))
+        assert turned < 0.1
+        np.testing.assert_allclose(frame.state.t_cam_head, upright.state.t_cam_head, atol=1)
+
+
+def test_killed_and_resumed_gives_the_same_bytes(
+    filmed: Filmed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Stopped(Tracker):
+        def step(self, pixels: Array, frame: int, time: float) -> TrackedFrame:
+            if frame == 3:
+                raise KeyboardInterrupt
+            return super().step(pixels, frame, time)
+
+    clip = written(tmp_path / "a.mp4", filmed.frames[:5], TIMES)
+    tables = [TrackFiles(tmp_path / name) for name in ("whole.csv", "t.csv")]
+    track_video(clip, filmed.head, tables[0], lens=LENS)
+    with monkeypatch.context() as patch:
+        patch.setattr(mien.app.track_run, "Tracker", Stopped)
+        with pytest.raises(KeyboardInterrupt):
+            track_video(clip, filmed.head, tables[1], lens=LENS)
+    assert track_video(clip, filmed.head, tables[1], lens=LENS, resume=True).resumed == 3
+    assert tables[1].table.read_bytes() == tables[0].table.read_bytes()
+
+
+def test_heads_are_told_apart(filmed: Filmed) -> None:
+    assert digest(filmed.head) == digest(filmed.head) != digest(other_head())
+
+
+@pytest.mark.parametrize(
+    ("times", "rate"),
+    [([], 25), ([3.0], 25), ([0.0, 0.0], 25), ([0, 0.04001, 0.08], 25), ([0, 0.1, 0.3], 20 / 3)],
+)
+def test_mean_rate(times: list[float], rate: float) -> None:
+    unknown = np.empty(0)
+    frames = [
+        TrackedFrame(number, time, "lost", None, np.nan, 0.0, unknown, unknown, unknown)
+        for number, time in enumerate(times)
+    ]
+    assert mean_rate(frames, 25) == pytest.approx(rate)
