@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -280,6 +281,19 @@ def test_all_that_can_be_written(clip: Path, tmp_path: Path) -> None:
 
     with av.open(tmp_path / "o.mp4") as container:
         assert len(list(container.decode(video=0))) == 12
+
+
+def test_memory_holds_no_pictures(tmp_path: Path) -> None:
+    """Two hundred frames more take what their numbers take."""
+    peaks = []
+    for count in (20, 220):
+        clip = written(tmp_path / f"{count}.mp4", grey([100] * count))
+        tracemalloc.start()
+        track(clip, tmp_path / "t.csv")
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    picture = 48 * 64 * 3
+    assert peaks[1] - peaks[0] < 200 * picture / 3
 
 
 @pytest.mark.parametrize(

@@ -87,9 +87,9 @@ def test_poses_at_a_variable_rate(filmed: Filmed) -> None:
         if frame.state is not None:
             true = camera_at(tenths)
             turned = np.degrees(angle_between(frame.state.R_cam_head, true.R_cam_head))
-            assert turned < 1
+            assert turned < 0.2
             off = np.linalg.norm(frame.state.t_cam_head - true.t_cam_head)
-            assert off < 0.01 * true.t_cam_head[2]
+            assert off < 0.002 * true.t_cam_head[2]
     assert filmed.track.fps == pytest.approx(28 / 3.0)
 
 
