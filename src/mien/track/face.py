@@ -77,6 +77,7 @@ class TrackedFace:
         compared: (F,) bool: those of the face, whose pixels count.
         moves: (P, V, 3) mm by which a step of 1 in each parameter moves each vertex.
         answers: which unknowns concern which triangles.
+        region_of: (F,) the region that each triangle belongs to most; -1 for none.
     Raises: InputError: as Rig; an unknown region.
     """
 
@@ -97,6 +98,8 @@ class TrackedFace:
         moves += _gaze_moves(head.mesh)
         self.moves = frozen(np.stack(moves))
         self.answers = self._answers()
+        shares = self._masks[mesh.triangles].mean(axis=1)
+        self.region_of = frozen(np.where(shares.max(axis=1) > 0, shares.argmax(axis=1), -1))
 
     @property
     def neutral(self) -> FaceParameters:

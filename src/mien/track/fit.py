@@ -8,8 +8,8 @@ import numpy as np
 
 from mien.arrays import Array, Float, UInt8
 from mien.camera import Camera
-from mien.track.colours import Colours, match_colours, pixel_weights, usual_difference
-from mien.track.drawing import Pose, draw_colours
+from mien.track.colours import Colours, match_colours
+from mien.track.drawing import Drawing, Pose, draw_colours
 from mien.track.equations import POSE_UNKNOWNS
 from mien.track.face import Anchor, TrackedFace
 from mien.track.phases import (
@@ -22,6 +22,8 @@ from mien.track.phases import (
     by_plain_pictures,
     solve,
 )
+from mien.track.restart import better_start
+from mien.track.trust import LEAST_SCALE, patch_trust, usual_difference
 from mien.track.views import View, cut_views
 
 _FIRST_SCALE = 40.0
@@ -103,30 +105,40 @@ class FrameFit:
         if found is None:
             return None
         views, face_px = found
-        least = 2 ** (len(views) - 1)
         smallest = views[-1]
-        target, weights = colours.luma_before(smallest.pixels), smallest.inside
-        scene = Scene(self.model, anchor, smallest, target, weights, _FIRST_SCALE, face_px / least)
+        scene = Scene(
+            self.model,
+            anchor,
+            smallest,
+            colours.luma_before(smallest.pixels),
+            smallest.inside,
+            _FIRST_SCALE,
+            face_px / 2 ** (len(views) - 1),
+        )
         guess = self._solved(scene, start, belief, by_plain_pictures, self._pose).guess
-        guess = self._solved(scene, guess, belief, by_bands, self._both).guess
-        told = self._told(scene, guess)
-        if told is None:
-            return None
-        colours, weights, scale, seen = told
+        answer = self._solved(scene, guess, belief, by_bands, self._both)
+        elsewhere = better_start(scene, answer.guess, answer.drawing)
+        if elsewhere is not None:
+            # What a leap says does not follow from the frame before.
+            belief = replace(belief, mean=replace(belief.mean, face=elsewhere.face))
+            answer = self._solved(scene, elsewhere, belief, by_bands, self._both)
+        colours = self._colours(scene, answer.guess)
+        trust = smallest.inside
         for level in reversed(range(len(views) - 1)):
             view = views[level]
-            scene = Scene(
-                self.model,
-                anchor,
-                view,
-                colours.luma_before(view.pixels),
-                _enlarged(weights, view),
-                scale,
-                face_px / 2**level,
+            scale = _scale(scene, answer.drawing)
+            scene = replace(
+                scene,
+                view=view,
+                target=colours.luma_before(view.pixels),
+                # What is not explained by now is something else than the face.
+                weights=view.inside if level else view.inside * _enlarged(trust, view),
+                scale=scale,
+                face_px=face_px / 2**level,
             )
-            answer = self._solved(scene, guess, belief, by_bands, self._both)
-            guess = answer.guess
-        return Fitted(guess, answer.deviations, colours, answer.rms, seen, _likeness(scene, answer))
+            answer = self._solved(scene, answer.guess, belief, by_bands, self._both)
+            trust = _trust(scene, answer.drawing)
+        return _fitted(scene, answer, colours)
 
     def _views(
         self, pixels: Array, camera: Camera, pose: Pose, anchor: Anchor
@@ -145,24 +157,16 @@ class FrameFit:
         views = cut_views(pixels, camera, points, face_px=face_px, levels=levels)
         return views, extent * views[0].focal / camera.focal_px
 
-    def _told(self, scene: Scene, guess: Guess) -> tuple[Colours, Array, float, float] | None:
-        """Colours, pixels' weights, scale and share of the face that is seen, of a rough guess."""
+    def _colours(self, scene: Scene, guess: Guess) -> Colours:
+        """The frame's, once the guess is roughly right."""
         model, view = self.model, scene.view
         face = model.posed(scene.anchor, guess.face)
         drawn, shown = draw_colours(model.painted, model.compared, face, guess.pose, view)
-        mask = shown * view.inside
-        if mask.sum() < 50:
-            return None
-        weights = mask
-        for _ in range(2):
-            colours = match_colours(drawn, view.pixels, weights)
-            matched = colours.applied(drawn)
-            weights = pixel_weights(matched, view.pixels, mask, face_px=scene.face_px)
-        scale = usual_difference(matched, view.pixels, weights)
-        seen = float(weights.sum() / max(shown.sum(), 1.0))
-        # Where the face comes in a little later there is no reason to distrust.
-        believed = np.where(shown > 0, weights, view.inside).astype(np.float32)
-        return colours, believed, scale, seen
+        weights = shown * view.inside
+        colours = match_colours(drawn, view.pixels, weights)
+        off = np.abs(colours.applied(drawn) - view.pixels).max(axis=2)
+        weights = weights / (1 + (off / LEAST_SCALE) ** 2) ** 2
+        return match_colours(drawn, view.pixels, weights)
 
     def _solved(
         self, scene: Scene, guess: Guess, belief: Belief, linearized: Linearize, free: Array
@@ -178,20 +182,33 @@ class FrameFit:
         )
 
 
-def _enlarged(weights: Float[Array, "h w"], view: View) -> Float[Array, "h w"]:
-    """Weights of a smaller size for a larger one; 0 beyond the frame's borders."""
+def _scale(scene: Scene, drawing: Drawing) -> float:
+    """Of the next size: by how much a pixel may be off."""
+    usual = usual_difference(drawing.luma, scene.target, scene.weights * drawing.mask)
+    return min(usual, scene.scale)
+
+
+def _trust(scene: Scene, drawing: Drawing) -> Float[Array, "h w"]:
+    weights = scene.view.inside * drawing.mask
+    return patch_trust(drawing.luma, scene.target, weights, face_px=scene.face_px)
+
+
+def _enlarged(trust: Float[Array, "h w"], view: View) -> Float[Array, "h w"]:
     import cv2
 
-    larger = cv2.resize(weights, view.size, interpolation=cv2.INTER_LINEAR)
-    larger *= view.inside
-    return np.asarray(larger)
+    return np.asarray(cv2.resize(trust, view.size, interpolation=cv2.INTER_LINEAR))
 
 
-def _likeness(scene: Scene, answer: Answer) -> float:
-    """Correlation of the frame and the drawn face over the pixels that count."""
-    chosen = (scene.weights * answer.drawing.mask) > 0.25
-    if np.count_nonzero(chosen) < 2:
-        return 0.0
-    a, b = answer.drawing.luma[chosen], scene.target[chosen]
+def _fitted(scene: Scene, answer: Answer, colours: Colours) -> Fitted:
+    """How well the face explains the frame, over the pixels that count."""
+    drawing = answer.drawing
+    weights = scene.weights * drawing.mask
+    seen = float(weights.sum() / max(float(drawing.mask.sum()), 1.0))
+    chosen = weights > 0.25
+    a, b = drawing.luma[chosen], scene.target[chosen]
+    if len(a) < 2:
+        return Fitted(answer.guess, answer.deviations, colours, np.inf, seen, 0.0)
+    rms = float(np.sqrt(((a - b) ** 2).mean()))
     a, b = a - a.mean(), b - b.mean()
-    return float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9))
+    likeness = float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9))
+    return Fitted(answer.guess, answer.deviations, colours, rms, seen, likeness)

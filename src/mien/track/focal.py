@@ -17,17 +17,18 @@ from mien.numeric.rotation import angle_between
 from mien.numeric.schur import BlockSystem
 from mien.track.lens import LogFocal, expected_focal
 from mien.track.mark_fit import MOST, Guess, MarkProblem, Observation, fit_face
-from mien.track.marks import REPEATED_MM, at_landmarks
+from mien.track.marks import REPEATED_MM
+from mien.track.meant import at_landmarks
 from mien.track.start import Starter
 
-MOST_FRAMES = 16
+MOST_FRAMES = 8
 """More add little."""
 _OTHERWISE_RAD, _OTHERWISE_NEAR = np.radians(5.0), 0.08
 """A frame tells something new when its head is turned by this much or as much (in log distance)
 nearer than in all that were used: landmarks err alike where heads are seen alike."""
 _WAYS = 24
 """Of heads to differ, the greatest first: landmarks are off in ways that look like a shape."""
-_ROUNDS, _SETTLED, _FARTHEST = 8, 1e-3, 0.3
+_ROUNDS, _SETTLED, _FARTHEST = 8, 0.01, 0.5
 _FOCAL = UNKNOWNS - 1
 _LITTLE = 0.7
 
@@ -102,36 +103,61 @@ class FocalEstimator:
         if not self._seen:
             return self._expected
         now, off = self._expected.mean, np.zeros(self._off_in_common.shape[2])
-        guesses, system = self._guesses, None
+        guesses, precision = self._guesses, self._expected.precision
         for _ in range(_ROUNDS):
-            system = self._system(now, off, guesses)
+            seen = self._corrected(now, guesses)
+            system = self._system(now, off, seen, guesses)
+            precision = 1 / float(system.covariance()[0][0, 0])
             step = system.solve(0.0)[0]
             ahead = float(np.clip(step[0], -_FARTHEST, _FARTHEST))
             now, off = now + ahead, off + step[1:]
-            nearer = np.array([1.0, 1.0, np.exp(ahead)])
-            guesses = [
-                fit_face(
-                    seen,
-                    self._starter.layout,
-                    np.exp(now),
-                    start=replace(guess, t=guess.t * nearer),
-                )
-                for seen, guess in zip(self._shifted(off), guesses, strict=True)
-            ]
-            if abs(step[0]) < _SETTLED:
+            if abs(ahead) < _SETTLED:
                 break
-        variance = float(self._system(now, off, guesses).covariance()[0][0, 0])
-        return LogFocal(now, 1 / variance)
+            guesses = self._refitted(now, off, seen, guesses, float(np.exp(ahead)))
+        return LogFocal(now, precision)
 
-    def _shifted(self, off: Float[Array, " w"]) -> list[Observation]:
-        """What was seen, of a head whose landmarks are off like this."""
+    def _corrected(self, log_focal: float, guesses: Sequence[Guess]) -> list[Observation]:
+        """What was seen, less what the detector errs by when it is shown the guesses.
+
+        Perspective is what it errs about most: it draws all faces as if seen from half a metre or
+        so, and without this they would all seem to be.
+        """
+        focal = float(np.exp(log_focal))
         return [
-            replace(seen, places=seen.places + self._off_in_common[seen.kept] @ off)
-            for seen in self._seen
+            self._starter.corrected(seen, guess, self._size, focal)
+            for seen, guess in zip(self._seen, guesses, strict=True)
         ]
 
+    def _refitted(
+        self,
+        log_focal: float,
+        off: Float[Array, " w"],
+        observations: Sequence[Observation],
+        guesses: Sequence[Guess],
+        nearer: float,
+    ) -> list[Guess]:
+        """Pose and face in every frame for another focal length and shape."""
+        scale = np.array([1.0, 1.0, nearer])
+        return [
+            fit_face(
+                self._shifted(seen, off),
+                self._starter.layout,
+                float(np.exp(log_focal)),
+                start=replace(guess, t=guess.t * scale),
+            )
+            for seen, guess in zip(observations, guesses, strict=True)
+        ]
+
+    def _shifted(self, seen: Observation, off: Float[Array, " w"]) -> Observation:
+        """The same of a head whose landmarks are off like this."""
+        return replace(seen, places=seen.places + self._off_in_common[seen.kept] @ off)
+
     def _system(
-        self, log_focal: float, off: Float[Array, " w"], guesses: Sequence[Guess]
+        self,
+        log_focal: float,
+        off: Float[Array, " w"],
+        observations: Sequence[Observation],
+        guesses: Sequence[Guess],
     ) -> BlockSystem:
         """Normal equations: in common log focal length and shape, in each frame the rest."""
         ways = len(off)
@@ -139,8 +165,8 @@ class FocalEstimator:
         common[0, 0] = self._expected.precision
         gradient[0] = self._expected.precision * (log_focal - self._expected.mean)
         blocks, coupling, block_gradients = [], [], []
-        for seen, guess in zip(self._shifted(off), guesses, strict=True):
-            hessian, slope = self._frame(seen, guess, float(np.exp(log_focal)))
+        for seen, guess in zip(observations, guesses, strict=True):
+            hessian, slope = self._frame(self._shifted(seen, off), guess, float(np.exp(log_focal)))
             shared = np.zeros(len(slope), bool)
             shared[[_FOCAL, *range(len(slope) - ways, len(slope))]] = True
             common += hessian[np.ix_(shared, shared)]

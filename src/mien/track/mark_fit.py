@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from mien.model.dense.projection import UNKNOWNS, Pinholes, project_places
 from mien.numeric.lm import minimize_lm
 from mien.numeric.robust import loss_named
 from mien.numeric.rotation import rotation_from_vector
-from mien.track.marks import Marks, facing_share
+from mien.track.marks import Marks
+from mien.track.meant import facing_share, viewpoint, viewpoint_slopes
 from mien.track.state import Layout
 
 ALIKE = 8.0
@@ -62,13 +63,15 @@ class Observation:
     """The N landmarks of one picture that can be trusted, and the detector's scores.
 
     Attributes:
-        places: (N, 3) mm on the neutral face. moves: (N, 3, P) mm, of the face's unknowns.
+        places: (N, 3) mm on the neutral face. drift: (N, 3, 3) mm, last axis the viewpoint's.
+        moves: (N, 3, P) mm, of the face's unknowns.
         image_points: (N, 2) px less the principal point. sigma_mm: (N,) each axis.
         scores: (S,) more than in the neutral face. score_moves: (P, S).
         R_cam_head: (3, 3) as the detector has it. kept: (N,) which of the 478 landmarks.
     """
 
     places: Float[Array, "n 3"]
+    drift: Float[Array, "n 3 3"]
     moves: Float[Array, "n 3 p"]
     image_points: Float[Array, "n 2"]
     sigma_mm: Float[Array, " n"]
@@ -84,6 +87,7 @@ class Observation:
         kept = np.flatnonzero(np.isfinite(marks.sigma_mm) & (trust > 0))
         return Observation(
             places=marks.places[kept],
+            drift=np.ascontiguousarray(marks.drift[:, kept].transpose(1, 2, 0)),
             moves=np.ascontiguousarray(marks.moves[:, kept].transpose(1, 2, 0)),
             image_points=face.points[kept, :2] - np.array(size) / 2,
             sigma_mm=marks.sigma_mm[kept] / trust[kept],
@@ -92,6 +96,21 @@ class Observation:
             R_cam_head=face.R_cam_head,
             kept=kept,
         )
+
+    def on(self, guess: Guess) -> Float[Array, "n 3"]:
+        """(N, 3) mm, head space: where the landmarks are on such a head seen from there."""
+        drifted = self.drift @ viewpoint(guess.R, guess.t)
+        places: Array = self.places + drifted + self.moves @ guess.face
+        return places
+
+    def against(
+        self, shown: DetectedFace, guess: Guess, size: tuple[int, int], focal_px: float
+    ) -> Observation:
+        """The same, less what the detector errs by in a picture of just this guess."""
+        in_camera = self.on(guess) @ guess.R.T + guess.t
+        wanted = focal_px * in_camera[:, :2] / in_camera[:, 2:] + np.array(size) / 2
+        errors = shown.points[self.kept, :2] - wanted
+        return replace(self, image_points=self.image_points - errors)
 
     def start(self, focal_px: float) -> Guess:
         """The neutral head turned as the detector says, where its landmarks agree best."""
@@ -150,8 +169,7 @@ class MarkProblem:
 
     def cost(self, guess: Guess) -> float:
         """At a guess."""
-        places = self._seen.places + self._seen.moves @ guess.face
-        in_camera = places @ guess.R.T + guess.t
+        in_camera = self._seen.on(guess) @ guess.R.T + guess.t
         if in_camera[:, 2].min() <= 0:
             return np.inf
         points = self._focal * in_camera[:, :2] / in_camera[:, 2:]
@@ -169,11 +187,14 @@ class MarkProblem:
         """The landmarks at a guess. Raises: EstimationError: one lies behind the camera."""
         seen = self._seen
         camera = Pinholes(guess.R[None], guess.t[None], np.array([self._focal]))
-        projection = project_places(camera, self._nowhere, seen.places + seen.moves @ guess.face)
+        projection = project_places(camera, self._nowhere, seen.on(guess))
         residuals = projection.image_points - seen.image_points
         _, share = loss_named("cauchy")((residuals**2).sum(axis=1) / self._sigma_px**2)
         weights = share / (ALIKE * self._sigma_px**2)
-        return Measured(projection.by_camera(), projection.by_place, residuals, weights)
+        by_camera = projection.by_camera()
+        slopes = viewpoint_slopes(guess.R, guess.t)
+        by_camera[..., :_POSE] += projection.by_place @ (seen.drift @ slopes)
+        return Measured(by_camera, projection.by_place, residuals, weights)
 
     def normal_equations(self, guess: Guess) -> tuple[Array, Array]:
         """(7 + P, 7 + P) and (7 + P,): Hessian and gradient over pose, log focal and face.

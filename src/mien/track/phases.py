@@ -26,10 +26,10 @@ from mien.track.views import View
 
 BAND = 0.2
 """Width of the widest structures that expressions are told by, over the face's."""
-SAY = 0.02
-"""How much of a pixel's evidence is its own: neighbours err alike, and so do the three colours."""
-LIMIT = 50.0
-"""c of P02's D(p), in units of the cost: a weight that is 0.2 out of range costs 2."""
+SAY = 500.0
+"""How many independent observations a face's pixels are, however many: neighbours err alike."""
+LIMIT = 200.0
+"""c of P02's D(p), in units of the cost: a weight that is 0.1 out of range costs 2."""
 _LEAST_NOISE = 2.0
 """Grey levels: nothing is believed to be drawn better than this."""
 
@@ -166,7 +166,7 @@ def solve(
     """The free unknowns of least cost, by P02 eq. (6); damping is in proportion to the diagonal.
 
     The cost is the squared residual of the pixels, in units of the noise that the guess leaves and
-    SAY of an observation each, plus half the squared distance from the belief, plus D(p).
+    counted as SAY observations in all, plus half the squared distance from the belief, plus D(p).
 
     Args:
         linearized: gives the pixels' equations.
@@ -183,11 +183,12 @@ def solve(
         return seen[id(x)]
 
     first = at(guess)[1]
+    say = min(1.0, SAY / scene.face_px**2)
     noise = max(first.squares / max(first.weight, 1e-9), _LEAST_NOISE**2)
 
     def scale(found: Equations) -> float:
         # Pixels that come and go at the outline must not count as better or worse.
-        return SAY / noise * first.weight / max(found.weight, 1e-9)
+        return say / noise * first.weight / max(found.weight, 1e-9)
 
     def cost(x: Guess) -> float:
         _, found, _, prior = at(x)

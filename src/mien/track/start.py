@@ -17,8 +17,9 @@ from mien.expressions.gaze import SIDES
 from mien.expressions.rig import Rig
 from mien.model.expression.gaze import MOST_RAD, direction_to_iris, yaw_pitch_of
 from mien.model.head import Head
-from mien.track.mark_fit import Observation, fit_face
+from mien.track.mark_fit import Guess, Observation, fit_face
 from mien.track.marks import measure_marks
+from mien.track.meant import Pictures
 from mien.track.state import Layout, TrackState
 
 SMALL = 0.15
@@ -48,7 +49,8 @@ class Starter:
     ) -> None:
         rig = Rig(head) if rig is None else rig
         self.layout, self._detector = layout, detector
-        self.marks = measure_marks(rig, head.mesh, layout, detector)
+        self._pictures = Pictures(rig, head.mesh, detector)
+        self.marks = measure_marks(rig, head.mesh, layout, self._pictures)
         self._eyes = _Eyes(head, rig, layout, self.marks.places)
 
     def find(self, pixels: UInt8[Array, "h w 3"], *, focal_px: float) -> TrackState | None:
@@ -84,6 +86,24 @@ class Starter:
             guess = fit_face(seen, self.layout, focal_px, start=seen.start(focal_px))
         except EstimationError:
             return None
+        return self._state(guess, face, size, focal_px)
+
+    def corrected(
+        self, seen: Observation, guess: Guess, size: tuple[int, int], focal_px: float
+    ) -> Observation:
+        """What was seen, less what the detector errs by in a picture of just this guess, 15 ms.
+
+        Unchanged where it finds no face in that.
+        """
+        camera = Camera(*size, focal_px, guess.R, guess.t)
+        weights, units = self._weights(guess.face)
+        state = TrackState(guess.R, guess.t, weights, units, np.zeros(2)).face(self.layout)
+        shown = self._pictures.show(state, camera)
+        return seen if shown is None else seen.against(shown, guess, size, focal_px)
+
+    def _state(
+        self, guess: Guess, face: DetectedFace, size: tuple[int, int], focal_px: float
+    ) -> TrackState:
         camera = Camera(*size, focal_px, guess.R, guess.t)
         weights, units = self._weights(guess.face)
         gaze = self._eyes.gaze(camera, face.points[:, :2], weights)
@@ -100,7 +120,8 @@ class Starter:
         seen = Observation.of(self.marks, face, size)
         unknowns = np.concatenate([state.weights[:, 1:].ravel(), state.units])
         camera = Camera(*size, focal_px, state.R_cam_head, state.t_cam_head)
-        in_camera = camera.to_camera(seen.places + seen.moves @ unknowns)
+        guess = Guess(state.R_cam_head, state.t_cam_head, unknowns)
+        in_camera = camera.to_camera(seen.on(guess))
         if in_camera[:, 2].min() <= 0:
             return float("inf")
         points = focal_px * in_camera[:, :2] / in_camera[:, 2:]

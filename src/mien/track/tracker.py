@@ -23,9 +23,11 @@ from mien.track.state import Layout, Status, TrackedFrame, TrackState
 
 _POSE_DEVIATIONS = (0.1, 0.1, 0.1, 15.0, 15.0, 40.0, 0.3)
 """Rotation (rad), translation (mm), log focal length: how far a head may go in a frame."""
-_WEIGHT_DEVIATION, _UNIT_DEVIATION, _GAZE_DEVIATION = 0.2, 0.2, 0.15
+_WEIGHT_DEVIATION, _UNIT_DEVIATION, _GAZE_DEVIATION = 0.2, 0.25, 0.2
 """How far what the face does may go from one frame to the next; of what pictures do not tell, this
 keeps the least change."""
+_REST_DEVIATION = 0.4
+"""How far units and gaze (rad) are from rest; what pictures do not tell goes back there."""
 _LEAST_LIKENESS, _LEAST_SEEN = 0.6, 0.3
 """Below these a face is lost: the drawn face does not look like the frame, or it is covered."""
 _USUAL_STEP = 1 / 25
@@ -104,7 +106,7 @@ class Tracker:
             return None
         guess = self._predicted(time)
         elapsed = max(time - self._past[-1].time, 1e-3) / _USUAL_STEP
-        belief = Belief(guess, self._deviations(min(np.sqrt(elapsed), 3.0)))
+        belief = self._belief(guess, min(np.sqrt(elapsed), 3.0))
         colours = Colours(self._past[-1].gain, self._past[-1].bias)
         return _if_like(self._fit.fit(pixels, camera, guess, belief, colours))
 
@@ -115,17 +117,25 @@ class Tracker:
             return None
         guess = self._guess(state)
         # Twice: the detector's landmarks are some millimetres off.
-        belief = Belief(guess, self._deviations(1.5))
+        belief = self._belief(guess, 1.5)
         first = self._fit.fit(pixels, camera, guess, belief, Colours())
         if first is None:
             return None
         belief = replace(belief, mean=first.guess)
         return _if_like(self._fit.fit(pixels, camera, first.guess, belief, first.colours))
 
-    def _deviations(self, factor: float) -> Float[Array, " n"]:
-        face = [_WEIGHT_DEVIATION] * self._model.neutral.alpha.size
-        face += [_UNIT_DEVIATION] * len(self.layout.units) + [_GAZE_DEVIATION] * 2
-        return factor * np.array([*_POSE_DEVIATIONS, *face])
+    def _belief(self, guess: Guess, factor: float) -> Belief:
+        """Around a guess; the factor widens it. Units and gaze tend to rest."""
+        mixing, units = guess.face.alpha.size, len(guess.face.units)
+        face = [_WEIGHT_DEVIATION] * mixing + [_UNIT_DEVIATION] * units + [_GAZE_DEVIATION] * 2
+        deviations = factor * np.array([*_POSE_DEVIATIONS, *face])
+        resting = np.s_[len(_POSE_DEVIATIONS) + mixing :]
+        stays = 1 / (1 + (deviations[resting] / _REST_DEVIATION) ** 2)
+        deviations[resting] *= np.sqrt(stays)
+        face = replace(
+            guess.face, units=stays[:-2] * guess.face.units, gaze=stays[-2:] * guess.face.gaze
+        )
+        return Belief(replace(guess, face=face), deviations)
 
     def _guess(self, state: TrackState) -> Guess:
         alpha = self._model.basis.alpha(state.weights)

@@ -14,6 +14,8 @@ _MARGIN = 0.3
 """Of the face's extent, on every side: as far as it may move between two frames."""
 _STEPS = [Fraction(part, 4 * 2**n) for n in range(5) for part in (4, 3)]
 """Scales: few and fixed, for one that followed the face would move every pixel's grid."""
+_BRIGHTEST = 253
+"""Of a colour that is certain not to be cut off."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +24,7 @@ class View:
 
     Attributes:
         pixels: (h, w, 3) float32, 0 to 255.
-        inside: (h, w) float32, 1 where the frame has a pixel, 0 beyond its borders.
+        inside: (h, w) float32, 1 where the frame has a pixel that tells how bright the face is.
         focal, cx, cy: px of this size; the principal point from the cut-out's corner.
     """
 
@@ -36,10 +38,6 @@ class View:
     def size(self) -> tuple[int, int]:
         """Width and height, px."""
         return self.pixels.shape[1], self.pixels.shape[0]
-
-    def with_focal(self, factor: float) -> View:
-        """The same picture through another lens."""
-        return View(self.pixels, self.inside, self.focal * factor, self.cx, self.cy)
 
 
 def cut_views(
@@ -71,16 +69,10 @@ def cut_views(
     for level in range(levels):
         scale = float(factor) / 2**level
         cx, cy = (camera.principal - origin) * scale
-        sizes = tuple(np.rint(side * scale).astype(int).tolist())
-        views.append(
-            View(
-                _reduced(cut, sizes),
-                _reduced(inside, sizes),
-                camera.focal_px * scale,
-                float(cx),
-                float(cy),
-            )
-        )
+        size = (round(side[0] * scale), round(side[1] * scale))
+        cut, inside = _reduced(cut, size), _reduced(inside, size)
+        focal = camera.focal_px * scale
+        views.append(View(np.float32(cut), np.float32(inside), focal, float(cx), float(cy)))
     return views
 
 
@@ -90,19 +82,29 @@ def _scale(wanted: float) -> Fraction:
 
 
 def _cut(pixels: Array, origin: Array, side: Array) -> tuple[Array, Array]:
-    """The part of the frame, its last pixels repeated beyond its borders."""
+    """The part of the frame, its last pixels repeated beyond its borders, and where it tells.
+
+    Beyond the borders it does not, nor where a colour is as bright as it can be: how bright the
+    face is there is not known.
+    """
+    import cv2
+
     height, width = pixels.shape[:2]
-    columns = origin[0] + np.arange(side[0])
-    rows = origin[1] + np.arange(side[1])
-    within = np.outer((rows >= 0) & (rows < height), (columns >= 0) & (columns < width))
-    cut = pixels[np.clip(rows, 0, height - 1)[:, None], np.clip(columns, 0, width - 1)]
-    return cut.astype(np.float32), within.astype(np.float32)
+    low = np.clip(origin, 0, [width - 1, height - 1])
+    high = np.clip(origin + side, low + 1, [width, height])
+    part = pixels[low[1] : high[1], low[0] : high[0]]
+    before, after = low - origin, origin + side - high
+    around = (before[1], after[1], before[0], after[0])
+    told = cv2.inRange(part, (0, 0, 0), (_BRIGHTEST,) * 3)
+    cut = cv2.copyMakeBorder(part, *around, cv2.BORDER_REPLICATE)
+    inside = cv2.copyMakeBorder(told, *around, cv2.BORDER_CONSTANT, value=0)
+    return np.float32(cut), np.float32(inside) / 255
 
 
 def _reduced(image: Array, size: tuple[int, int]) -> Array:
     import cv2
 
-    if image.shape[1::-1] == size:
+    if (image.shape[1], image.shape[0]) == size:
         return image
     reduced: Array = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     return reduced

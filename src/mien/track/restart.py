@@ -1,0 +1,81 @@
+"""Another start where descent went into the wrong valley: a blink or a mouth faster than frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.track.drawing import Drawing
+from mien.track.face import BLINKS, FaceParameters, TrackedFace
+from mien.track.phases import Guess, Scene
+
+_SUSPICIOUS = 9.0
+"""Grey levels of RMS difference in a region from which another start is looked for, ..."""
+_STANDS_OUT = 1.5
+"""... if that is so many times the face's."""
+_BETTER = 0.85
+"""Of the difference, squared: another start must bring it down to this."""
+_ASIDE = 0.4
+"""Radians: how far eyes look aside when they do."""
+
+
+def better_start(scene: Scene, guess: Guess, drawing: Drawing) -> Guess | None:
+    """A guess that explains a badly explained region clearly better; None: there is none.
+
+    Tried are the photographed expressions, one at a time in the region; in that of the eyes, open
+    and shut lids and looks to the sides.
+    """
+    errors = _region_errors(scene, drawing)
+    whole = _mean_square(scene, drawing)
+    found = None
+    for region in np.flatnonzero(errors > np.maximum(_SUSPICIOUS**2, _STANDS_OUT**2 * whole)):
+        best = errors[region] * _BETTER
+        for face in _candidates(scene.model, (found or guess).face, int(region)):
+            tried = replace(guess, face=face)
+            error = _region_errors(scene, scene.draw(tried, layers=False))[region]
+            if error < best:
+                best, found = error, tried
+    return found
+
+
+def _candidates(model: TrackedFace, face: FaceParameters, region: int) -> Iterator[FaceParameters]:
+    eyes = "eye" in model.layout.regions[region]
+    opened = _with_eyes(model, face, blink=0.0, yaw=0.0) if eyes else face
+    for weights in np.eye(len(model.layout.expressions)):
+        alpha = opened.alpha.copy()
+        alpha[region] = model.basis.alpha(weights)
+        yield replace(opened, alpha=alpha)
+    if eyes:
+        yield _with_eyes(model, face, blink=1.0, yaw=0.0)
+        for yaw in (0.0, -_ASIDE, _ASIDE):
+            yield _with_eyes(model, face, blink=0.0, yaw=yaw)
+
+
+def _with_eyes(
+    model: TrackedFace, face: FaceParameters, *, blink: float, yaw: float
+) -> FaceParameters:
+    units = face.units.copy()
+    units[[name in BLINKS for name in model.layout.units]] = blink
+    return replace(face, units=units, gaze=np.array([yaw, 0.0]))
+
+
+def _region_errors(scene: Scene, drawing: Drawing) -> Float[Array, " r"]:
+    """(R,) mean square difference in each region."""
+    weights = scene.weights * drawing.mask
+    regions = np.where(drawing.mask > 0, scene.model.region_of[drawing.ids], -1)
+    squares = weights * (drawing.luma - scene.target) ** 2
+    count = len(scene.model.layout.regions)
+    inside = regions >= 0
+    total = np.bincount(regions[inside], squares[inside], count)
+    whole = np.bincount(regions[inside], weights[inside], count)
+    errors: Array = total / np.maximum(whole, 1.0)
+    return errors
+
+
+def _mean_square(scene: Scene, drawing: Drawing) -> float:
+    weights = scene.weights * drawing.mask
+    squares = weights * (drawing.luma - scene.target) ** 2
+    return float(squares.sum() / max(float(weights.sum()), 1.0))
