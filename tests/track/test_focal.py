@@ -18,7 +18,7 @@ from mien.errors import InputError
 from mien.numeric.rotation import rotation_from_vector
 from mien.track.focal import MOST_FRAMES, FocalEstimator, estimate_focal
 from mien.track.lens import LogFocal
-from mien.track.marks import at_landmarks
+from mien.track.meant import at_landmarks
 
 DIAGONAL = float(np.hypot(*SIZE))
 TRUTH = 0.9 * DIAGONAL

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import posable
-from marked import FOCAL, FRONT, SIZE, Blind, Shown, face_of, posed, prepared, starter
+from marked import FOCAL, LAYOUT, SIZE, Blind, Shown, face_of, posed, prepared, starter
 from mien.camera import Camera
 from mien.capture.mediapipe_face import LANDMARK_COUNT, DetectedFace
 from mien.errors import InputError
 from mien.numeric.rotation import angle_between, rotation_from_vector
-from mien.track.marks import Sight, facing, landmark_normals, places_meant
+from mien.track.mark_fit import Guess, MarkProblem, Observation, bounded_step
 from mien.track.start import Starter
 from mien.track.state import Layout, TrackState
 
@@ -142,23 +144,45 @@ def test_layout_that_is_not_the_heads() -> None:
         Starter(posable.head(), Layout(("mouth",), posable.NAMES, ("wink",)), Blind())
 
 
-def test_pictures_tell_where_a_landmark_is_meant() -> None:
-    vertices = posable.REST
-    attached = posable.GENERIC.landmark_positions(vertices)
-    normals = landmark_normals(posable.GENERIC, posable.GENERIC.mesh)
-    shift = np.array([2.0, -3.0, 0.0])
-    sights = []
-    for yaw in (-20, 0, 20):
-        turned = rotation_from_vector(np.radians([0, yaw, 0])) @ FRONT
-        camera = Camera(*SIZE, FOCAL, turned, np.array([0.0, 0.0, 600.0]))
-        points = np.column_stack([camera.project(attached + shift), np.zeros(LANDMARK_COUNT)])
-        sights.append(Sight(camera, DetectedFace(points, np.full(52, 0.25), turned)))
-    meant = places_meant(attached, normals, sights)
-    seen = np.all([facing(s.camera, attached, normals) > 0.5 for s in sights], axis=0)
-    assert seen.sum() > 100
-    np.testing.assert_allclose(meant.beside[seen], np.tile(shift, (seen.sum(), 1)), atol=0.5)
-    np.testing.assert_array_equal(meant.scores, 0.25)
-    assert np.nanmax(np.abs(meant.misses[:, seen])) < 0.5
-    blind = places_meant(attached, normals, [])
-    np.testing.assert_array_equal(blind.beside, 0)
-    assert not blind.seen
+def test_what_the_detector_errs_by_in_a_picture_of_the_guess_is_taken_off() -> None:
+    truth, errors = posed(), np.array([4.0, -3.0])
+    marks, camera = starter().marks, Camera(*SIZE, FOCAL, truth.R_cam_head, truth.t_cam_head)
+    guess = Guess(truth.R_cam_head, truth.t_cam_head, np.zeros(len(marks.moves)))
+    wrong = face_of(truth, noise=errors)
+    seen = Observation.of(marks, wrong, SIZE)
+    corrected = seen.against(wrong, guess, SIZE, FOCAL)
+    wanted = camera.project(seen.places) - np.array(SIZE) / 2
+    np.testing.assert_allclose(seen.image_points, wanted + errors, atol=1e-9)
+    np.testing.assert_allclose(corrected.image_points, wanted, atol=1e-9)
+
+
+def test_equations_of_a_face_are_slopes_of_its_cost(rng: np.random.Generator) -> None:
+    one = starter()
+    drifting = replace(one.marks, drift=rng.normal(size=(3, LANDMARK_COUNT, 3)))
+    truth = posed()
+    seen = Observation.of(drifting, face_of(truth, noise=rng.normal(size=(478, 2))), SIZE)
+    face = rng.uniform(0.1, 0.3, len(drifting.moves))
+    guess = Guess(truth.R_cam_head, truth.t_cam_head, face)
+    problem = MarkProblem(seen, LAYOUT, FOCAL, near=guess)
+    _, gradient = problem.normal_equations(guess)
+    moves = np.delete(np.arange(len(gradient)), 6)  # All but the focal length.
+    for index, unknown in enumerate(moves):
+        step = np.zeros(len(moves))
+        step[index] = 1e-5
+        slope = problem.cost(guess.moved(step)) - problem.cost(guess.moved(-step))
+        assert gradient[unknown] == pytest.approx(slope / 2e-5, rel=1e-4, abs=1e-4)
+
+
+def test_a_step_between_bounds_is_the_lowest_place(rng: np.random.Generator) -> None:
+    root = rng.normal(size=(12, 6))
+    hessian, gradient = root.T @ root, rng.normal(size=6) * 4
+    low, high = np.full(6, -0.2), np.full(6, 0.3)
+    low[0], high[1] = 0.0, 0.0
+    step = bounded_step(hessian, gradient, low, high)
+    assert (step >= low).all()
+    assert (step <= high).all()
+    assert step @ gradient + 0.5 * step @ hessian @ step < 0
+    free = np.linalg.solve(hessian, -gradient)
+    np.testing.assert_allclose(
+        bounded_step(hessian, gradient, np.full(6, -np.inf), np.full(6, np.inf)), free
+    )

@@ -207,7 +207,7 @@ def estimate_focal(
     Args:
         frames: upright pictures of one size, at most as many as are worth 10 ms each.
         expected: what is known before; by default lens.expected_focal.
-    Raises: InputError: no frames. EstimationError: no camera sees the landmarks so.
+    Raises: InputError: no frames.
     """
     estimator, size = None, None
     for pixels in frames:
@@ -220,7 +220,10 @@ def estimate_focal(
             estimator.add(face)
     if estimator is None or size is None or expected is None:
         raise InputError("frames", "at least one", "none")
-    found = estimator.estimate()
+    try:
+        found = estimator.estimate()
+    except EstimationError:
+        found = expected
     return FocalEstimate(
         found.focal_px,
         found.deviation,
