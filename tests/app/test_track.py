@@ -15,7 +15,7 @@ import mien.app.track
 import mien.app.track_run
 from filmed import broken, grey, written
 from mien.animate.tracked import FACING
-from mien.app.track import STARTED_OVER, Tracked, track_video
+from mien.app.track import COUNTED, STARTED_OVER, Tracked, track_video
 from mien.app.track_files import TrackFiles
 from mien.arrays import Array
 from mien.errors import FileFormatError, InputError, MienError
@@ -131,6 +131,21 @@ def test_a_table_of_all_frames(clip: Path, tmp_path: Path) -> None:
     assert [frame.time for frame in found.frames] == pytest.approx(np.arange(12) / 10)
     assert [frame.status for frame in found.frames][5:8] == ["lost", "lost", "reacquired"]
     assert not journal_of(tmp_path / "t.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("tracked", "text"),
+    [
+        (
+            Tracked(448, {"ok": 443, "reacquired": 2, "lost": 3}, 100, 31.24, 6.12, 800),
+            "448 frames, 100 from before, 2 found again, 3 lost, 31.2 frames/s, "
+            "error 6.1 grey levels",
+        ),
+        (Tracked(2, {"ok": 0, "reacquired": 0, "lost": 2}, 0, None, None, 800), "2 frames, 2 lost"),
+    ],
+)
+def test_what_the_terminal_says(tracked: Tracked, text: str) -> None:
+    assert str(tracked) == text
 
 
 @pytest.mark.parametrize("stops_at", [0, 1, 2, 6, 7, 11])
@@ -274,6 +289,7 @@ def test_all_that_can_be_written(clip: Path, tmp_path: Path) -> None:
     told: list[str] = []
     track_video(clip, head(), files, progress=lambda stage, done, total: told.append(stage))
     assert list(dict.fromkeys(told)) == ["Tracking", "Drawing the overlay", "Drawing plots"]
+    assert set(told) - set(COUNTED) == {"Drawing plots"}
     assert (tmp_path / "plots" / "index.html").exists()
     for name in ("l.csv", "f.csv"):
         assert len((tmp_path / name).read_text().splitlines()) == 13

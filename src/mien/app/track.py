@@ -10,9 +10,9 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
 
-from mien.app.track_files import TrackFiles
-from mien.app.track_lens import find_focal
-from mien.app.track_run import TrackRun
+from mien.app.track_files import OVERLAY, TrackFiles
+from mien.app.track_lens import LENS, find_focal
+from mien.app.track_run import TRACKING, TrackRun
 from mien.arrays import check_positive
 from mien.capture.detector import LandmarkDetector
 from mien.capture.video import Video
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 MAX_SIDE = 1920
 """px; larger pictures are tracked reduced to it. Reducing smaller ones would take longer than it
 saves: a face is compared at a size of its own anyway."""
+COUNTED = (LENS, TRACKING, OVERLAY)
+"""Stages whose steps are frames."""
 STARTED_OVER = "the run that was not finished was started over; it could have been resumed"
 
 
@@ -52,6 +54,18 @@ class Tracked:
     rms: float | None
     focal_px: float
     notes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """`448 frames, 2 found again, 3 lost, 31.2 frames/s, error 6.1 grey levels`"""
+        parts = [
+            f"{self.frames} frames",
+            f"{self.resumed} from before" * bool(self.resumed),
+            f"{self.counts['reacquired']} found again" * bool(self.counts["reacquired"]),
+            f"{self.counts['lost']} lost" * bool(self.counts["lost"]),
+            "" if self.fps is None else f"{self.fps:.1f} frames/s",
+            "" if self.rms is None else f"error {self.rms:.1f} grey levels",
+        ]
+        return ", ".join(filter(None, parts))
 
 
 def track_video(
