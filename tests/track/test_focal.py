@@ -70,7 +70,7 @@ def test_a_head_that_moves_tells_the_focal_length(
 ) -> None:
     found, frames = estimate(faces(places, rng), HOUSE)
     assert found.focal_px == pytest.approx(TRUTH, rel=0.02)
-    assert found.deviation < 0.12
+    assert found.deviation < 0.16
     assert frames > 6
 
 
