@@ -1,0 +1,151 @@
+"""P02's other way of computing the Jacobian: central differences of the drawn picture.
+
+Nothing is left out: contacts, occlusion and what a filter makes of a moving outline are all in it.
+It takes two more drawings for every unknown, where the analytic way takes none (docs/tracking.md
+compares them).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mien.arrays import Array, Bool, Float, Int
+from mien.errors import InputError
+from mien.track.bands import band_pass, odd
+from mien.track.drawing import Drawing
+from mien.track.equations import (
+    POSE_UNKNOWNS,
+    Answers,
+    Comparison,
+    Equations,
+    band_equations,
+    screen_flows,
+)
+from mien.track.face import TrackedFace
+from mien.track.phases import BAND, Guess, Linearize, Scene
+from mien.track.state import Layout
+
+STEP_PX = 0.5
+"""How far a step moves the fastest part of the face."""
+_LONGEST = 0.1
+"""Step in the face's parameters where next to nothing moves."""
+
+
+def by_differences(
+    numeric: Bool[Array, " n"],
+    *,
+    plain: bool = False,
+    exact: bool = False,
+    step_px: float = STEP_PX,
+) -> Linearize:
+    """Equations of pose and face, some columns of the Jacobian by differences, the others analytic.
+
+    Args:
+        numeric: (N,) which unknowns are to be by differences; any, all or none.
+        plain: compare plain pictures; otherwise band-pass filtered ones.
+        exact: draw the rig's own face every time, contacts and shadows too, not the face that is
+            linear around the scene's anchor.
+        step_px: how far a step moves the fastest part of the face.
+    Source: P02 sec. 6.1.3, but that the residual is differentiated, not the drawn picture alone:
+        the filter takes its means over the face, and with the face the target's mean moves too.
+    """
+
+    def linearized(scene: Scene, guess: Guess) -> tuple[Equations, Drawing]:
+        scene = _anchored(scene, guess) if exact else scene
+        drawing = scene.draw(guess, layers=True)
+        layers, drawn, target = _pictures(scene, drawing, plain)
+        flows = screen_flows(scene.model.moves, drawing.places, guess.pose, scene.view)
+        steps = _steps(scene.model, flows, step_px)
+        which = np.flatnonzero(numeric)
+        changes = [_change(scene, guess, int(n), steps[n], plain=plain, exact=exact) for n in which]
+        # What changes the picture pixel by pixel is what a layer is: equations.py knows it as such.
+        layers = np.dstack([layers, *changes]) if changes else layers
+        flows[:, which] = 0
+        comparison = Comparison(drawn, target, scene.weights * drawing.mask, scene.scale)
+        answers = _with_layers(scene.model.answers, which)
+        return band_equations(drawing, layers, comparison, flows, answers), drawing
+
+    return linearized
+
+
+def unknowns_named(layout: Layout, names: Sequence[str]) -> Bool[Array, " n"]:
+    """Which unknowns these names stand for: `pose`, a region, a unit, `gaze`.
+
+    Raises: InputError: another name.
+    """
+    directions = len(layout.expressions) - 1
+    owners = [*["pose"] * POSE_UNKNOWNS]
+    owners += [region for region in layout.regions for _ in range(directions)]
+    owners += [*layout.units, "gaze", "gaze"]
+    known = dict.fromkeys(("pose", *layout.regions, *layout.units, "gaze"))
+    for name in names:
+        if name not in known:
+            raise InputError("numeric", f"some of {', '.join(known)}", name)
+    return np.isin(owners, list(names))
+
+
+def _anchored(scene: Scene, guess: Guess) -> Scene:
+    return replace(scene, anchor=scene.model.anchored(guess.face))
+
+
+def _pictures(
+    scene: Scene, drawing: Drawing, plain: bool
+) -> tuple[Float[Array, "h w k"], Float[Array, "h w"], Float[Array, "h w"]]:
+    """Layers, their mixture and the target as they are compared."""
+    if plain:
+        return drawing.layers, drawing.luma, scene.target
+    width = odd(BAND * scene.face_px)
+    shown = (drawing.layers, drawing.luma, scene.target)
+    return band_pass(*shown, drawing.mask, scene.weights, width)
+
+
+def _change(
+    scene: Scene, guess: Guess, unknown: int, step: float, *, plain: bool, exact: bool
+) -> Float[Array, "h w"]:
+    """How the residual falls with an unknown; 0 where not both steps show the face."""
+    ahead = np.zeros(POSE_UNKNOWNS + len(guess.face.vector))
+    ahead[unknown] = step
+    residuals, shown = [], []
+    for moved in (guess.moved(ahead), guess.moved(-ahead)):
+        seen = _anchored(scene, moved) if exact else scene
+        drawing = seen.draw(moved, layers=False)
+        _, drawn, target = _pictures(seen, drawing, plain)
+        residuals.append(target - drawn)
+        shown.append(drawing.mask > 0)
+    change = (residuals[1] - residuals[0]) / np.float32(2 * step)
+    return np.where(shown[0] & shown[1], change, np.float32(0))
+
+
+def _steps(model: TrackedFace, flows: Float[Array, "v n 2"], step_px: float) -> Float[Array, " n"]:
+    """(N,) that move the fastest vertex by so many px; no longer than _LONGEST in the face's."""
+    outline = np.unique(model.painted.triangles[model.compared])
+    fastest = np.linalg.norm(flows[outline], axis=2).max(axis=0)
+    longest = np.full(len(fastest), _LONGEST)
+    longest[:POSE_UNKNOWNS] = np.inf
+    steps: Array = np.minimum(step_px / np.maximum(fastest, 1e-9), longest)
+    return steps
+
+
+def _with_layers(answers: Answers, numeric: Int[Array, " m"]) -> Answers:
+    """As if each numeric unknown mixed in a layer of its own, everywhere; they come last."""
+    count, unknowns = len(numeric), len(answers.region)
+    (layers, directions), (vertices, regions) = answers.Q.shape, answers.masks.shape
+    Q = np.zeros((layers + count, directions + count), np.float32)
+    Q[:layers, :directions] = answers.Q
+    Q[layers:, directions:] = np.eye(count)
+    region, direction = answers.region.copy(), answers.direction.copy()
+    region[numeric] = regions
+    direction[numeric] = directions + np.arange(count)
+    triangles = len(answers.active)
+    return Answers(
+        active=np.tile(np.arange(unknowns, dtype=np.int32), (triangles, 1)),
+        counts=np.full(triangles, unknowns, np.int32),
+        region=region,
+        direction=direction,
+        Q=Q,
+        masks=np.column_stack([answers.masks, np.ones(vertices, np.float32)]),
+        triangles=answers.triangles,
+    )
