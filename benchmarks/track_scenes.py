@@ -59,7 +59,7 @@ _KEYS = (
 
 _MADE_UP = {
     "anger": {"browDown": 1.0, "noseSneer": 0.7, "mouthFrown": 0.5, "mouthPress": 0.5},
-    "joy": {"mouthSmile": 0.9, "cheekSquint": 0.8, "eyeSquint": 0.4, "jawOpen": 0.12},
+    "joy": {"mouthSmile": 0.9, "cheekSquint": 0.8, "browOuterUp": 0.5, "jawOpen": 0.12},
     "awe": {"jawOpen": 0.6, "browInnerUp": 0.9, "browOuterUp": 0.8, "eyeWide": 0.6},
     "sulk": {"mouthPucker": 0.7, "mouthShrugLower": 0.6, "browInnerUp": 0.5, "eyeBlink": 0.3},
 }
