@@ -25,6 +25,11 @@ class Colours:
     gain: Float[Array, " 3"] = field(default_factory=lambda: np.ones(3))
     bias: Float[Array, " 3"] = field(default_factory=lambda: np.zeros(3))
 
+    def towards(self, other: Colours, share: float) -> Colours:
+        """A part of the way to others."""
+        gain = self.gain + share * (other.gain - self.gain)
+        return Colours(gain, self.bias + share * (other.bias - self.bias))
+
     def applied(self, drawn: Float[Array, "h w 3"]) -> Float[Array, "h w 3"]:
         """The drawn picture as the frame would have it."""
         return np.asarray(drawn * self.gain + self.bias, np.float32)

@@ -214,6 +214,18 @@ def _sobel(picture: Array, row: int, col: int) -> tuple[float, float]:
 
 
 @njit(inline="always")
+def _gradient(drawn: Array, target: Array, row: int, col: int) -> tuple[float, float]:
+    """The mean of both pictures' gradients: half the iterations that the drawn one's alone takes.
+
+    Source: Benhimane and Malis, Real-time image-based tracking of planes using efficient
+    second-order minimization, 2004.
+    """
+    drawn_x, drawn_y = _sobel(drawn, row, col)
+    target_x, target_y = _sobel(target, row, col)
+    return 0.5 * (drawn_x + target_x), 0.5 * (drawn_y + target_y)
+
+
+@njit(inline="always")
 def _whole(ids: Array, row: int, col: int) -> bool:
     """Whether the pixel and all eight around it show the face.
 
@@ -250,7 +262,7 @@ def _add_pose(
             if weight == 0.0 or not _whole(ids, row, col):
                 continue
             r = target[row, col] - drawn[row, col]
-            gx, gy = _sobel(drawn, row, col)
+            gx, gy = _gradient(drawn, target, row, col)
             totals[1] += weight
             trust = 1.0 / (1.0 + r * r / (scale * scale))
             totals[0] += weight * trust * r * r
@@ -290,7 +302,7 @@ def _add_bands(
                 continue
             t = ids[row, col]
             r = target[row, col] - drawn[row, col]
-            gx, gy = _sobel(drawn, row, col)
+            gx, gy = _gradient(drawn, target, row, col)
             totals[1] += weight
             trust = 1.0 / (1.0 + r * r / (scale * scale))
             totals[0] += weight * trust * r * r

@@ -26,8 +26,10 @@ from mien.track.restart import better_start
 from mien.track.trust import LEAST_SCALE, patch_trust, usual_difference
 from mien.track.views import View, cut_views
 
-_FIRST_SCALE = 40.0
+_FIRST_SCALE = 60.0
 """Grey levels by which a pixel may be off before anything is fitted."""
+_COLOUR_PACE = 0.2
+"""Share of what one frame says of its colours: a camera's change slowly."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ class Fitted:
 
     Attributes:
         guess: of least cost. deviations: (N,) of its unknowns.
+        information: (N - 1, N - 1) inverse covariance of all but the focal length.
         colours: of the frame over the drawn ones.
         rms: grey levels, over the pixels that count.
         seen: their share of the face.
@@ -61,6 +64,7 @@ class Fitted:
 
     guess: Guess
     deviations: Float[Array, " n"]
+    information: Float[Array, "m m"]
     colours: Colours
     rms: float
     seen: float
@@ -122,7 +126,7 @@ class FrameFit:
             # What a leap says does not follow from the frame before.
             belief = replace(belief, mean=replace(belief.mean, face=elsewhere.face))
             answer = self._solved(scene, elsewhere, belief, by_bands, self._both)
-        colours = self._colours(scene, answer.guess)
+        colours = colours.towards(self._colours(scene, answer.guess), _COLOUR_PACE)
         trust = smallest.inside
         for level in reversed(range(len(views) - 1)):
             view = views[level]
@@ -206,9 +210,10 @@ def _fitted(scene: Scene, answer: Answer, colours: Colours) -> Fitted:
     seen = float(weights.sum() / max(float(drawing.mask.sum()), 1.0))
     chosen = weights > 0.25
     a, b = drawing.luma[chosen], scene.target[chosen]
+    found = (answer.guess, answer.deviations, answer.information)
     if len(a) < 2:
-        return Fitted(answer.guess, answer.deviations, colours, np.inf, seen, 0.0)
+        return Fitted(*found, colours, np.inf, seen, 0.0)
     rms = float(np.sqrt(((a - b) ** 2).mean()))
     a, b = a - a.mean(), b - b.mean()
     likeness = float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9))
-    return Fitted(answer.guess, answer.deviations, colours, rms, seen, likeness)
+    return Fitted(*found, colours, rms, seen, likeness)

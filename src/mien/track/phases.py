@@ -26,7 +26,7 @@ from mien.track.views import View
 
 BAND = 0.2
 """Width of the widest structures that expressions are told by, over the face's."""
-SAY = 500.0
+SAY = 2000.0
 """How many independent observations a face's pixels are, however many: neighbours err alike."""
 LIMIT = 200.0
 """c of P02's D(p), in units of the cost: a weight that is 0.1 out of range costs 2."""
@@ -142,12 +142,14 @@ class Answer:
         guess: of least cost.
         deviations: (N,) standard deviations of the unknowns given picture and belief; the belief's
             own for those that were not free.
+        information: (M, M) inverse covariance of the free unknowns.
         drawing: of the guess. iterations: linearizations made.
         rms: grey levels, of the pixels' weighted residual.
     """
 
     guess: Guess
     deviations: Float[Array, " n"]
+    information: Float[Array, "m m"]
     drawing: Drawing
     iterations: int
     rms: float
@@ -223,9 +225,10 @@ def solve(
     )
     _, found, drawing, _ = at(result.x)
     deviations = belief.deviations.copy()
-    deviations[free] = np.sqrt(np.diag(np.linalg.inv(normal(result.x)[0])))
+    information = normal(result.x)[0]
+    deviations[free] = np.sqrt(np.diag(np.linalg.inv(information)))
     rms = float(np.sqrt(found.squares / max(found.weight, 1e-9)))
-    return Answer(result.x, deviations, drawing, result.iterations, rms)
+    return Answer(result.x, deviations, information, drawing, result.iterations, rms)
 
 
 class _Prior(NamedTuple):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mien.arrays import Array, Float, UInt8
+from mien.arrays import Array, Float, Int, UInt8
 from mien.camera import Camera
 from mien.capture.detector import LandmarkDetector
 from mien.model.head import Head
@@ -20,6 +20,7 @@ from mien.track.fit import FitOptions, Fitted, FrameFit
 from mien.track.phases import Belief, Guess
 from mien.track.start import Starter
 from mien.track.state import Layout, Status, TrackedFrame, TrackState
+from mien.track.steady import steady_step
 
 _POSE_DEVIATIONS = (0.1, 0.1, 0.1, 15.0, 15.0, 40.0, 0.3)
 """Rotation (rad), translation (mm), log focal length: how far a head may go in a frame."""
@@ -76,6 +77,7 @@ class Tracker:
         self._starter = Starter(head, self.layout, detector, rig=self._model.rig)
         self._camera = Camera(width, height, focal_px, np.eye(3), np.array([0.0, 0.0, 1000.0]))
         self._past: list[TrackedFrame] = []
+        self._blocks = _blocks(self._model)
 
     def resume(self, frames: Sequence[TrackedFrame]) -> None:
         """Go on as if these frames had been tracked."""
@@ -108,7 +110,19 @@ class Tracker:
         elapsed = max(time - self._past[-1].time, 1e-3) / _USUAL_STEP
         belief = self._belief(guess, min(np.sqrt(elapsed), 3.0))
         colours = Colours(self._past[-1].gain, self._past[-1].bias)
-        return _if_like(self._fit.fit(pixels, camera, guess, belief, colours))
+        fitted = _if_like(self._fit.fit(pixels, camera, guess, belief, colours))
+        return None if fitted is None else self._steadied(fitted)
+
+    def _steadied(self, fitted: Fitted) -> Fitted:
+        """With no more motion since the frame before than can be told from noise."""
+        before = self._past[-1].state
+        assert before is not None
+        start = self._guess(before)
+        step = fitted.guess.since(start)
+        solved = np.arange(len(step)) != POSE_UNKNOWNS - 1
+        taken = np.zeros(len(step))
+        taken[solved] = steady_step(step[solved], fitted.information, self._blocks)
+        return replace(fitted, guess=start.moved(taken))
 
     def _found(self, pixels: Array, camera: Camera) -> Fitted | None:
         """By the detector; None where it finds no face, or another's."""
@@ -193,3 +207,10 @@ def _if_like(fitted: Fitted | None) -> Fitted | None:
     if fitted is None or fitted.likeness < _LEAST_LIKENESS or fitted.seen < _LEAST_SEEN:
         return None
     return fitted
+
+
+def _blocks(model: TrackedFace) -> list[Int[Array, " m"]]:
+    """Of the unknowns without the focal length: the pose, each region, units, gaze."""
+    alpha, units = model.neutral.alpha, len(model.layout.units)
+    sizes = [POSE_UNKNOWNS - 1, *([alpha.shape[1]] * len(alpha)), units, 2]
+    return np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])

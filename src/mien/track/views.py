@@ -60,9 +60,9 @@ def cut_views(
     extent = float((high - low).max())
     factor = _scale(face_px / max(extent, 1.0))
     margin = _MARGIN * extent
-    origin = np.floor(low - margin).astype(int)
-    # So that every level is a whole number of pixels.
+    # So that every level is a whole number of pixels, always the same ones.
     multiple = factor.denominator * 2 ** (levels - 1)
+    origin = np.floor((low - margin) / multiple).astype(int) * multiple
     side = np.ceil((high + margin - origin) / multiple).astype(int) * multiple
     cut, inside = _cut(pixels, origin, side)
     views = []
