@@ -19,7 +19,7 @@ from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import load_generic_head
 from mien.capture.detector import LandmarkDetector
 from mien.capture.landmarks import facing_confidence
-from mien.capture.mediapipe_face import LEFT_IRIS, RIGHT_IRIS
+from mien.capture.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace
 from mien.capture.video import Video
 from mien.formats.head_folder import load_head
 from mien.model.head import Head
@@ -46,7 +46,8 @@ class Clip:
     """A clip that was tracked, and what was found in its frames.
 
     Attributes:
-        frames: (H, W, 3) each. followed: by mien. peer: MediaPipe's faces in video mode.
+        frames: (H, W, 3) each. followed: by mien.
+        alone: MediaPipe's faces in each frame for itself. peer: in video mode, smoothed over time.
         reprojection: (N,) percent of the distance of the eyes, each frame's median.
         psnr: (N,) dB over the face. NaN where a frame is lost.
     """
@@ -54,6 +55,7 @@ class Clip:
     name: str
     frames: tuple[UInt8[Array, "h w 3"], ...]
     followed: Followed
+    alone: tuple[DetectedFace | None, ...]
     peer: tuple[PeerFace | None, ...]
     reprojection: Float[Array, " n"]
     psnr: Float[Array, " n"]
@@ -80,12 +82,14 @@ def measure(name: str, path: Path, head: Head, detector: LandmarkDetector) -> Cl
     focal = float(np.median([view.camera.focal_px for view in head.views]))
     followed = follow(head, frames, detector, focal_px=focal, fps=facts.fps)
     renderer, track = HeadRenderer(head), followed.track
+    alone = tuple(detector.detect_fast(pixels) for pixels in frames)
     return Clip(
         name,
         frames,
         followed,
+        alone,
         tuple(peer_faces(read)),
-        _reprojection(track, renderer, frames, detector),
+        _reprojection(track, renderer, alone),
         _psnr(track, renderer, frames),
     )
 
@@ -102,19 +106,12 @@ def _psnr(
 
 
 def _reprojection(
-    track: Track,
-    renderer: HeadRenderer,
-    frames: Sequence[UInt8[Array, "h w 3"]],
-    detector: LandmarkDetector,
+    track: Track, renderer: HeadRenderer, alone: Sequence[DetectedFace | None]
 ) -> Float[Array, " n"]:
-    """Against the detector's points, which it finds in each frame for itself.
-
-    Only landmarks that are attached to the head and face the camera.
-    """
+    """Against the detector's points; only landmarks that are attached and face the camera."""
     generic = load_generic_head()
-    values = np.full(len(frames), np.nan)
-    for index, (found, pixels) in enumerate(zip(track.frames, frames, strict=True)):
-        seen = detector.detect_fast(pixels)
+    values = np.full(len(alone), np.nan)
+    for index, (found, seen) in enumerate(zip(track.frames, alone, strict=True)):
         if found.state is None or seen is None:
             continue
         face = renderer.rig.evaluate(found.state.face(track.layout))
@@ -127,26 +124,67 @@ def _reprojection(
     return values
 
 
-def tremble(clip: Clip, renderer: HeadRenderer) -> tuple[Jitter, Jitter]:
-    """mien's and MediaPipe's on the same still frames."""
+@dataclass(frozen=True)
+class Tremble:
+    """Jitter on the same still frames: mien's, MediaPipe's in video mode and frame by frame."""
+
+    mien: Jitter
+    peer: Jitter
+    alone: Jitter
+
+    @property
+    def row(self) -> list[object]:
+        """For the table."""
+        mien, peer, alone = self.mien, self.peer, self.alone
+        return [
+            mien.frames,
+            *(mien.rotation, peer.rotation, mien.rotation / peer.rotation, alone.rotation),
+            *(mien.translation, peer.translation, mien.translation / peer.translation),
+            *(mien.nose, peer.nose, mien.nose / peer.nose, alone.nose),
+        ]
+
+
+def tremble(clip: Clip, renderer: HeadRenderer) -> Tremble:
+    """Of all three on the same frames."""
     points = [None if face is None else face.points for face in clip.peer]
     still = still_frames(frame_motion(clip.frames, points))
-    track, series = clip.followed.track, series_of(clip.followed.track)
-    noses = np.full((len(clip.frames), 2), np.nan)
+    lost = np.full((3, 3), np.nan)
+    series = series_of(clip.followed.track)
+    peer = [
+        (lost, lost[0], lost[0, :2])
+        if face is None
+        else (face.rotation, face.translation, face.points[_NOSE_TIP])
+        for face in clip.peer
+    ]
+    # Frame by frame, the distance is not told.
+    alone = [
+        (lost, lost[0], lost[0, :2])
+        if face is None
+        else (face.R_cam_head, np.ones(3), face.points[_NOSE_TIP, :2])
+        for face in clip.alone
+    ]
+    noses = _noses(clip.followed.track, renderer)
+    return Tremble(
+        jitter(series.rotations, series.translations, noses, still),
+        _jitter_of(peer, still),
+        _jitter_of(alone, still),
+    )
+
+
+def _jitter_of(poses: Sequence[tuple[Array, Array, Array]], still: Array) -> Jitter:
+    rotations, translations, noses = (np.array(values) for values in zip(*poses, strict=True))
+    return jitter(rotations, translations, noses, still)
+
+
+def _noses(track: Track, renderer: HeadRenderer) -> Float[Array, "n 2"]:
+    """(N, 2) px: the nose tip's landmark on the head as it was found."""
+    noses = np.full((len(track.frames), 2), np.nan)
     for index, found in enumerate(track.frames):
         if found.state is not None:
             face = renderer.rig.evaluate(found.state.face(track.layout))
             places = load_generic_head().landmark_positions(face.vertices)[[_NOSE_TIP]]
             noses[index] = track.camera(found.state).project(places)[0]
-    ours = jitter(series.rotations, series.translations, noses, still)
-    lost = np.full((3, 3), np.nan)
-    theirs = jitter(
-        np.array([lost if face is None else face.rotation for face in clip.peer]),
-        np.array([lost[0] if face is None else face.translation for face in clip.peer]),
-        np.array([lost[0, :2] if face is None else face.points[_NOSE_TIP] for face in clip.peer]),
-        still,
-    )
-    return ours, theirs
+    return noses
 
 
 FACES = (
@@ -167,23 +205,15 @@ JITTERS = (
     "rotation, degrees: mien",
     "MediaPipe",
     "mien / MediaPipe",
+    "MediaPipe frame by frame",
     "translation, % of distance: mien",
     "MediaPipe",
     "mien / MediaPipe",
     "nose, px: mien",
     "MediaPipe",
     "mien / MediaPipe",
+    "MediaPipe frame by frame",
 )
-
-
-def jitter_row(name: str, ours: Jitter, theirs: Jitter) -> list[object]:
-    """For the table."""
-    pairs = (
-        (ours.rotation, theirs.rotation),
-        (ours.translation, theirs.translation),
-        (ours.nose, theirs.nose),
-    )
-    return [name, ours.frames, *(value for a, b in pairs for value in (a, b, a / b))]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -200,7 +230,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             head = load_head(asked.heads / name)
             clip = measure(name, path, head, detector)
             faces.append(clip.row)
-            jitters.append(jitter_row(name, *tremble(clip, HeadRenderer(head))))
+            jitters.append([name, *tremble(clip, HeadRenderer(head)).row])
             print(faces[-1], jitters[-1], file=sys.stderr)
     parts = [markdown_table(FACES, faces), markdown_table(JITTERS, jitters)]
     write_results("track_clips", "Tracking real clips", parts)
