@@ -9,6 +9,7 @@ import numpy as np
 
 from mien.arrays import Array, Bool, Float, frozen
 from mien.assets.generic import load_generic_head
+from mien.errors import InputError
 from mien.expressions.basis import WEIGHT_RANGE, Basis
 from mien.expressions.rig import Rig
 from mien.expressions.state import FaceState, Gaze, PosedFace
@@ -78,7 +79,7 @@ class TrackedFace:
         moves: (P, V, 3) mm by which a step of 1 in each parameter moves each vertex.
         answers: which unknowns concern which triangles.
         region_of: (F,) the region that each triangle belongs to most; -1 for none.
-    Raises: InputError: as Rig; an unknown region.
+    Raises: InputError: as Rig; an unknown region or unit.
     """
 
     def __init__(
@@ -88,6 +89,9 @@ class TrackedFace:
         if units is None:
             expressive = tuple(name for name in head.unit_names if _is_expressive(name))
             units = BLINKS if len(self.rig.names) > 1 else expressive
+        unknown = [name for name in units if name not in head.unit_names]
+        if unknown:
+            raise InputError("units", f"some of {', '.join(head.unit_names)}", unknown[0])
         self.layout = Layout(tuple(regions), self.rig.names, tuple(units))
         self.basis = Basis.by_gram_schmidt(len(self.rig.names))
         mesh, self.compared = _seen(head.mesh, load_generic_head().regions)
@@ -156,7 +160,7 @@ class TrackedFace:
             frozen(np.ascontiguousarray(array, np.int32))
             for array in (active, counts, region, direction)
         )
-        Q, masks = np.float32(self.basis.Q), np.float32(self._masks)
+        Q, masks = (np.asarray(array, np.float32) for array in (self.basis.Q, self._masks))
         return Answers(active, counts, region, direction, frozen(Q), frozen(masks), triangles)
 
 

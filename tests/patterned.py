@@ -1,0 +1,134 @@
+"""A head whose skin is a smooth pattern that is known, for tests of tracking: exact pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from mien.arrays import Array
+from mien.camera import Camera
+from mien.model.head import ATLAS, Expression, Head
+from mien.numeric.raster import interpolate, rasterize
+from mien.numeric.rotation import rotation_from_vector
+from mien.render.morph import MorphRenderer
+from mien.track.drawing import Pose
+from mien.track.face import FaceParameters, TrackedFace
+from mien.track.phases import Guess, Scene
+from mien.track.views import View, cut_views
+from posable import GENERIC, REST, UNITS, head_of, shapes
+
+SIZE, FOCAL = 240, 560.0
+FRONT = np.diag([1.0, -1.0, -1.0])
+NAMES = ("neutral", "joy", "anger")
+"""Of the head's expressions; both others go with a pattern of their own."""
+_TEXELS = 512
+
+
+@cache
+def head(names: tuple[str, ...] = NAMES) -> Head:
+    """Somebody with these expressions, eyes straight ahead in all of them."""
+    made = shapes()
+    made["anger"] = np.where(_eyes(), REST, made["anger"])
+    expressions = {
+        name: Expression(
+            made[name], texture=ATLAS if name == "neutral" else name, units=UNITS.get(name, {})
+        )
+        for name in names
+    }
+    textures = {item.texture: pattern(seed) for seed, item in enumerate(expressions.values())}
+    return head_of(expressions=expressions, textures=textures)
+
+
+@cache
+def model(names: tuple[str, ...] = NAMES) -> TrackedFace:
+    """That head, prepared."""
+    return TrackedFace(head(names))
+
+
+def _eyes() -> Array:
+    mesh = GENERIC.mesh
+    chosen = np.zeros((len(mesh.vertices), 1), bool)
+    chosen[mesh.triangles[mesh.triangles_of("left_eyeball", "right_eyeball")]] = True
+    return chosen
+
+
+@cache
+def pattern(seed: int) -> Array:
+    """(h, w, 3) uint8: waves through the head's space some 3 to 6 cm long, without a seam."""
+    mesh = GENERIC.mesh
+    texels = np.column_stack([mesh.uvs[:, 0], 1 - mesh.uvs[:, 1]]) * _TEXELS
+    flat = rasterize(texels, np.ones(len(texels)), mesh.uv_triangles, _TEXELS, _TEXELS)
+    places = interpolate(flat, mesh.triangles, REST)
+    around = distance_transform_edt(~flat.mask, return_distances=False, return_indices=True)
+    places = places[tuple(around)]
+    rng = np.random.default_rng(seed)
+    colours = np.full((_TEXELS, _TEXELS, 3), 125.0)
+    for _ in range(5):
+        direction = rng.normal(size=3)
+        length = rng.uniform(30, 60)
+        wave = 2 * np.pi * places @ direction / np.linalg.norm(direction) / length
+        colours += rng.uniform(8, 22, 3) * np.sin(wave + rng.uniform(0, 2 * np.pi))[..., None]
+    return np.clip(np.rint(colours), 0, 255).astype(np.uint8)
+
+
+def pose(
+    degrees: tuple[float, float, float] = (4, 12, -3),
+    place: tuple[float, float, float] = (8, -12, 620),
+) -> Pose:
+    """Turned about the camera's x, y and z; mm."""
+    R = rotation_from_vector(np.radians(degrees)) @ FRONT
+    return Pose(R, np.array(place))
+
+
+def doing(
+    weights: Mapping[str, tuple[float, ...]] | None = None,
+    *,
+    units: tuple[float, float] = (0.0, 0.0),
+    gaze: tuple[float, float] = (0.0, 0.0),
+    names: tuple[str, ...] = NAMES,
+) -> FaceParameters:
+    """A face of these weights of the expressions but neutral by region, blinks and radians."""
+    shown = model(names)
+    rows = np.zeros((len(shown.layout.regions), len(shown.layout.expressions)))
+    for region, row in (weights or {}).items():
+        rows[shown.layout.regions.index(region), 1:] = row
+    rows[:, 0] = 1 - rows.sum(axis=1)
+    return FaceParameters(shown.basis.alpha(rows), np.array(units), np.array(gaze))
+
+
+def camera(where: Pose, *, size: int = SIZE) -> Camera:
+    """That sees the head there."""
+    return Camera(size, size, FOCAL * size / SIZE, where.R, where.t)
+
+
+def picture(guess: Guess, *, names: tuple[str, ...] = NAMES, wall: int = 70) -> Array:
+    """(SIZE, SIZE, 3) uint8: the rig's own face as mien's renderer draws it."""
+    face = model(names).anchored(guess.face).face
+    seen_from = camera(guess.pose)
+    image = _renderer(names).render(face, seen_from, samples=9, background=(wall,) * 3)
+    return np.ascontiguousarray(image[..., :3])
+
+
+@cache
+def _renderer(names: tuple[str, ...]) -> MorphRenderer:
+    return MorphRenderer(head(names).mesh, model(names).rig.textures)
+
+
+def view(pixels: Array, where: Pose, *, face_px: float = 150.0, level: int = 0) -> View:
+    """What the tracker cuts out of a picture of the head there."""
+    shown = model()
+    outline = np.unique(shown.painted.triangles[shown.compared])
+    points = camera(where).project(REST[outline])
+    return cut_views(pixels, camera(where), points, face_px=face_px, levels=level + 1)[level]
+
+
+def scene(truth: Guess, anchor: FaceParameters | None = None) -> Scene:
+    """The truth, drawn by the tracker's own means, to be explained around an anchor."""
+    shown = model()
+    cut = view(picture(truth), truth.pose)
+    of = Scene(shown, shown.anchored(anchor or truth.face), cut, cut.inside, cut.inside, 1e3, 150.0)
+    return replace(of, target=of.draw(truth, layers=False).luma)
