@@ -10,8 +10,9 @@ from mien.arrays import Array, Float
 from mien.track.drawing import LUMA
 
 _GAIN_SD = 0.3
-_LIKE_PIXELS = 200.0
-"""How many pixels' worth the belief weighs that a gain is 1 to within its deviation."""
+"""How far a camera's gain is from 1."""
+_SAY = 200.0
+"""How many independent observations a face's pixels are."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def match_colours(
     dx, dy = x - mean_x, y - mean_y
     variance = np.maximum(w @ (dx * dx), 1e-9)
     noise = np.maximum(w @ (dy - dx) ** 2 / total, 1.0)
-    belief = np.minimum(noise / _GAIN_SD**2, variance) * _LIKE_PIXELS / total
+    belief = noise / _GAIN_SD**2 * total / _SAY
     gain = (w @ (dx * dy) + belief) / (variance + belief)
     gain = np.clip(gain, 0.2, 5.0)
     return Colours(gain, mean_y - gain * mean_x)
