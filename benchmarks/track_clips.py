@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +26,7 @@ from mien.model.head import Head
 from mien.render.picture import HeadRenderer
 from mien.report.likeness import draw_tracked, face_psnr
 from mien.report.track_series import series_of
+from mien.track.smooth import smooth
 from mien.track.state import Track
 
 VIDEOS = DATA / "videos"
@@ -37,6 +38,7 @@ CLIPS = {
     "d10": VIDEOS / "driving_d10.mp4",
     "d19": VIDEOS / "driving_d19.mp4",
 }
+SMOOTH = 0.08
 _NOSE_TIP = 4
 _CONFIDENT = 0.5
 
@@ -126,22 +128,24 @@ def _reprojection(
 
 @dataclass(frozen=True)
 class Tremble:
-    """Jitter on the same still frames: mien's, MediaPipe's in video mode and frame by frame."""
+    """Jitter on the same still frames.
+
+    Attributes:
+        mien: as tracked. smoothed: with SMOOTH seconds.
+        peer: MediaPipe in video mode. alone: MediaPipe frame by frame.
+    """
 
     mien: Jitter
+    smoothed: Jitter
     peer: Jitter
     alone: Jitter
 
-    @property
-    def row(self) -> list[object]:
-        """For the table."""
-        mien, peer, alone = self.mien, self.peer, self.alone
-        return [
-            mien.frames,
-            *(mien.rotation, peer.rotation, mien.rotation / peer.rotation, alone.rotation),
-            *(mien.translation, peer.translation, mien.translation / peer.translation),
-            *(mien.nose, peer.nose, mien.nose / peer.nose, alone.nose),
-        ]
+    def row(self, measure: Callable[[Jitter], float]) -> list[float]:
+        """For the table of one measure."""
+        mien, smoothed, peer, alone = map(
+            measure, (self.mien, self.smoothed, self.peer, self.alone)
+        )
+        return [alone, peer, mien, mien / peer, smoothed, smoothed / peer]
 
 
 def tremble(clip: Clip, renderer: HeadRenderer) -> Tremble:
@@ -149,7 +153,6 @@ def tremble(clip: Clip, renderer: HeadRenderer) -> Tremble:
     points = [None if face is None else face.points for face in clip.peer]
     still = still_frames(frame_motion(clip.frames, points))
     lost = np.full((3, 3), np.nan)
-    series = series_of(clip.followed.track)
     peer = [
         (lost, lost[0], lost[0, :2])
         if face is None
@@ -163,12 +166,17 @@ def tremble(clip: Clip, renderer: HeadRenderer) -> Tremble:
         else (face.R_cam_head, np.ones(3), face.points[_NOSE_TIP, :2])
         for face in clip.alone
     ]
-    noses = _noses(clip.followed.track, renderer)
     return Tremble(
-        jitter(series.rotations, series.translations, noses, still),
+        _tracked_jitter(clip.followed.track, renderer, still),
+        _tracked_jitter(smooth(clip.followed.track, SMOOTH), renderer, still),
         _jitter_of(peer, still),
         _jitter_of(alone, still),
     )
+
+
+def _tracked_jitter(track: Track, renderer: HeadRenderer, still: Array) -> Jitter:
+    series = series_of(track)
+    return jitter(series.rotations, series.translations, _noses(track, renderer), still)
 
 
 def _jitter_of(poses: Sequence[tuple[Array, Array, Array]], still: Array) -> Jitter:
@@ -200,19 +208,42 @@ FACES = (
     "frames/s",
 )
 JITTERS = (
-    "",
     "still frames",
-    "rotation, degrees: mien",
+    "MediaPipe, each frame alone",
     "MediaPipe",
+    "mien",
     "mien / MediaPipe",
-    "MediaPipe frame by frame",
-    "translation, % of distance: mien",
-    "MediaPipe",
-    "mien / MediaPipe",
-    "nose, px: mien",
-    "MediaPipe",
-    "mien / MediaPipe",
-    "MediaPipe frame by frame",
+    f"mien --smooth {SMOOTH:g}",
+    "that / MediaPipe",
+)
+MEASURES: Mapping[str, Callable[[Jitter], float]] = {
+    "rotation, degrees": lambda found: found.rotation,
+    "translation, % of distance": lambda found: found.translation,
+    "nose tip, px": lambda found: found.nose,
+}
+
+
+def jitter_tables(trembles: Mapping[str, Tremble]) -> list[str]:
+    """One for each measure."""
+    return [
+        markdown_table(
+            (what, *JITTERS), [[n, t.mien.frames, *t.row(measure)] for n, t in trembles.items()]
+        )
+        for what, measure in MEASURES.items()
+    ]
+
+
+INTRO = (
+    "Each clip is tracked from its first frame to its last with a head that `mien build` made of "
+    "the same clip, through the lens that was found for that. Landmarks: where the tracked head "
+    "has those that MediaPipe finds in each frame for itself, the median over a frame. PSNR: the "
+    "frame against the head drawn in the frame's size and colours, over all of the face, hands "
+    "before it included. Frames/s: of the tracker alone, by the median of its steps."
+)
+STILL = (
+    "Jitter: root mean square second difference on stretches in which the face is still, as "
+    "sparse optical flow tells (benchmarks/README.md). MediaPipe smooths over time in its video "
+    "mode and not frame by frame."
 )
 
 
@@ -224,15 +255,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     asked = parser.parse_args(arguments)
     named = [item.partition("=")[::2] for item in asked.clips]
     clips = {name: Path(path) if path else CLIPS[name] for name, path in named} or CLIPS
-    faces, jitters = [], []
+    faces, trembles = [], {}
     with LandmarkDetector() as detector:
         for name, path in clips.items():
             head = load_head(asked.heads / name)
             clip = measure(name, path, head, detector)
             faces.append(clip.row)
-            jitters.append([name, *tremble(clip, HeadRenderer(head)).row])
-            print(faces[-1], jitters[-1], file=sys.stderr)
-    parts = [markdown_table(FACES, faces), markdown_table(JITTERS, jitters)]
+            trembles[name] = tremble(clip, HeadRenderer(head))
+            print(faces[-1], file=sys.stderr)
+    parts = [INTRO, markdown_table(FACES, faces), STILL, *jitter_tables(trembles)]
     write_results("track_clips", "Tracking real clips", parts)
     return 0
 
