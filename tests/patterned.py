@@ -30,16 +30,17 @@ _TEXELS = 512
 
 @cache
 def head(names: tuple[str, ...] = NAMES) -> Head:
-    """Somebody with these expressions, eyes straight ahead in all of them."""
+    """Somebody with these expressions, eyes straight ahead; `twin` is like joy."""
     made = shapes()
     made["anger"] = np.where(_eyes(), REST, made["anger"])
+    made["twin"] = made["joy"]
+    textures = {ATLAS: pattern(0), "joy": pattern(1), "anger": pattern(2)}
+    used = {"neutral": ATLAS, "twin": "joy"}
     expressions = {
-        name: Expression(
-            made[name], texture=ATLAS if name == "neutral" else name, units=UNITS.get(name, {})
-        )
+        name: Expression(made[name], texture=used.get(name, name), units=UNITS.get(name, {}))
         for name in names
     }
-    textures = {item.texture: pattern(seed) for seed, item in enumerate(expressions.values())}
+    textures = {name: textures[name] for name in {item.texture for item in expressions.values()}}
     return head_of(expressions=expressions, textures=textures)
 
 
@@ -126,9 +127,11 @@ def view(pixels: Array, where: Pose, *, face_px: float = 150.0, level: int = 0) 
     return cut_views(pixels, camera(where), points, face_px=face_px, levels=level + 1)[level]
 
 
-def scene(truth: Guess, anchor: FaceParameters | None = None) -> Scene:
+def scene(
+    truth: Guess, anchor: FaceParameters | None = None, *, names: tuple[str, ...] = NAMES
+) -> Scene:
     """The truth, drawn by the tracker's own means, to be explained around an anchor."""
-    shown = model()
-    cut = view(picture(truth), truth.pose)
+    shown = model(names)
+    cut = view(picture(truth, names=names), truth.pose)
     of = Scene(shown, shown.anchored(anchor or truth.face), cut, cut.inside, cut.inside, 1e3, 150.0)
     return replace(of, target=of.draw(truth, layers=False).luma)
