@@ -119,6 +119,8 @@ class TrackedFace:
 
     def anchored(self, parameters: FaceParameters) -> Anchor:
         """The rig's face at these parameters."""
+        units = np.where(np.abs(parameters.units) > 0.1, parameters.units, 0.0)
+        parameters = FaceParameters(parameters.alpha, units, parameters.gaze)
         rows = self.weights(parameters)[:, 1:].tolist()
         expressions = {
             region: dict(zip(self.layout.expressions[1:], row, strict=True))

@@ -30,7 +30,7 @@ SAY = 2000.0
 """How many independent observations a face's pixels are, however many: neighbours err alike."""
 LIMIT = 200.0
 """c of P02's D(p), in units of the cost: a weight that is 0.1 out of range costs 2."""
-_LEAST_NOISE = 2.0
+_LEAST_NOISE = 0.5
 """Grey levels: nothing is believed to be drawn better than this."""
 
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int
 
-LEAST_GAIN = 0.25
+LEAST_GAIN = 0.2
 """Share of a step that is taken when it is all noise."""
-_CLEAR = 2.0
+_CLEAR = 3.0
 """Standard deviations at which the other shares are half way to all of it."""
 
 
@@ -40,7 +40,7 @@ def steady_step(
             continue
         own = np.linalg.inv(covariance[np.ix_(block, block)])
         distance = float(step[block] @ own @ step[block]) / len(block)
-        gain = LEAST_GAIN + (1 - LEAST_GAIN) * distance / (distance + _CLEAR**2)
+        gain = LEAST_GAIN + (1 - LEAST_GAIN) * distance**2 / (distance**2 + _CLEAR**4)
         matrix[np.ix_(block, block)] += (1 - gain) / gain * own
     taken: Array = np.linalg.solve(matrix, information @ step)
     return taken

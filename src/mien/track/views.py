@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 
@@ -12,8 +12,6 @@ from mien.camera import Camera
 
 _MARGIN = 0.3
 """Of the face's extent, on every side: as far as it may move between two frames."""
-_STEPS = [Fraction(part, 4 * 2**n) for n in range(5) for part in (4, 3)]
-"""Scales: few and fixed, for one that followed the face would move every pixel's grid."""
 _BRIGHTEST = 253
 """Of a colour that is certain not to be cut off."""
 
@@ -53,21 +51,22 @@ def cut_views(
     Args:
         camera: of the frame's own pixels.
         points: (N, 2) px where the face is thought to be.
-        face_px: width at which a face is compared; a smaller one stays as it is.
+        face_px: extent at which a face is compared, give or take a factor of sqrt(2); a smaller
+            one stays as it is.
         levels: how many sizes.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     extent = float((high - low).max())
-    factor = _scale(face_px / max(extent, 1.0))
+    halvings = _halvings(extent, face_px)
     margin = _MARGIN * extent
     # So that every level is a whole number of pixels, always the same ones.
-    multiple = factor.denominator * 2 ** (levels - 1)
+    multiple = 2 ** (halvings + levels - 1)
     origin = np.floor((low - margin) / multiple).astype(int) * multiple
     side = np.ceil((high + margin - origin) / multiple).astype(int) * multiple
     cut, inside = _cut(pixels, origin, side)
     views = []
     for level in range(levels):
-        scale = float(factor) / 2**level
+        scale = 0.5 ** (halvings + level)
         cx, cy = (camera.principal - origin) * scale
         size = (round(side[0] * scale), round(side[1] * scale))
         cut, inside = _reduced(cut, size), _reduced(inside, size)
@@ -76,9 +75,13 @@ def cut_views(
     return views
 
 
-def _scale(wanted: float) -> Fraction:
-    """The greatest step that is not more than an eighth above what is wanted."""
-    return next((step for step in _STEPS if step <= 1.125 * wanted), _STEPS[-1])
+def _halvings(extent: float, wanted: float) -> int:
+    """How often to halve an extent until it is at most sqrt(2) times the one wanted.
+
+    A scale that followed the face would move every pixel's grid, and one that is no whole number
+    of pixels would blur unevenly.
+    """
+    return max(0, math.ceil(math.log2(max(extent, 1.0) / wanted) - 0.5))
 
 
 def _cut(pixels: Array, origin: Array, side: Array) -> tuple[Array, Array]:
