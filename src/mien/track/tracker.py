@@ -57,6 +57,7 @@ class Tracker:
 
     Args:
         width, height, focal_px: of the video's upright pictures.
+        model, starter: of this head and these units, if there are any already; a second each.
     Raises: InputError: as Rig.
     """
 
@@ -69,12 +70,14 @@ class Tracker:
         focal_px: float,
         detector: LandmarkDetector,
         options: TrackOptions | None = None,
+        model: TrackedFace | None = None,
+        starter: Starter | None = None,
     ) -> None:
         options = options or TrackOptions()
-        self._model = TrackedFace(head, units=options.units)
+        self._model = model or TrackedFace(head, units=options.units)
         self._fit = FrameFit(self._model, options.fit)
         self.layout: Layout = self._model.layout
-        self._starter = Starter(head, self.layout, detector, rig=self._model.rig)
+        self._starter = starter or Starter(head, self.layout, detector, rig=self._model.rig)
         self._camera = Camera(width, height, focal_px, np.eye(3), np.array([0.0, 0.0, 1000.0]))
         self._past: list[TrackedFrame] = []
         self._blocks = _blocks(self._model)
