@@ -15,6 +15,7 @@ import mien.app.track
 import mien.app.track_run
 from filmed import broken, grey, written
 from mien.animate.tracked import FACING
+from mien.app.ready_head import ReadyHead
 from mien.app.track import COUNTED, STARTED_OVER, Tracked, track_video
 from mien.app.track_files import TrackFiles
 from mien.arrays import Array
@@ -90,7 +91,7 @@ def tracker(monkeypatch: pytest.MonkeyPatch) -> type[BrightnessTracker]:
         def __exit__(self, *error: object) -> None:
             return None
 
-    monkeypatch.setattr(mien.app.track_run, "Tracker", Fresh)
+    monkeypatch.setattr(ReadyHead, "tracker", Fresh)
     monkeypatch.setattr(mien.app.track, "LandmarkDetector", Nobody)
     monkeypatch.setattr(mien.app.track, "find_focal", lambda *rest: (100.0, "of the lens"))
     return Fresh

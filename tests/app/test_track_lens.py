@@ -7,6 +7,7 @@ import pytest
 
 import mien.app.track_lens
 from filmed import written
+from mien.app.ready_head import ReadyHead
 from mien.app.track_lens import LENS, find_focal
 from mien.arrays import Array
 from mien.capture.video import Video
@@ -24,16 +25,15 @@ def test_every_fifth_of_the_first_frames_is_looked_at(
         seen.extend(frames)
         return FocalEstimate(400.0, 0.1, 2, "a note")
 
-    for name, double in (("estimate_focal", estimate), ("Starter", lambda *rest: None)):
-        monkeypatch.setattr(mien.app.track_lens, name, double)
+    monkeypatch.setattr(mien.app.track_lens, "estimate_focal", estimate)
+    monkeypatch.setattr(ReadyHead, "starter", None)
     monkeypatch.setattr(mien.app.track_lens, "_SIDE", 32)
     levels = range(20, 140, 10)
     frames = (np.full((48, 64, 3), level, np.uint8) for level in levels)
     clip = Video(written(tmp_path / "a.mp4", frames))
     told: list[tuple[str, int, int]] = []
-    focal_px, note = find_focal(
-        clip, clip.facts(), head(), TrackOptions(), None, lambda *step: told.append(step)
-    )
+    ready = ReadyHead(head(), None, TrackOptions())
+    focal_px, note = find_focal(clip, clip.facts(), ready, lambda *step: told.append(step))
     assert (focal_px, note) == (800.0, "a note"), "of the pictures at their full size"
     assert [picture.mean() for picture in seen] == pytest.approx([20, 70, 120], abs=3)
     assert {picture.shape for picture in seen} == {(24, 32, 3)}

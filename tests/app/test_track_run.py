@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import mien.app.track_run
+import mien.app.ready_head
 from filmed import flagged, written
 from mien.animate.tracked import FACING
 from mien.app.track import Tracked, track_video
@@ -120,7 +120,7 @@ def test_killed_and_resumed_gives_the_same_bytes(
     tables = [TrackFiles(tmp_path / name) for name in ("whole.csv", "t.csv")]
     track_video(clip, filmed.head, tables[0], lens=LENS)
     with monkeypatch.context() as patch:
-        patch.setattr(mien.app.track_run, "Tracker", Stopped)
+        patch.setattr(mien.app.ready_head, "Tracker", Stopped)
         with pytest.raises(KeyboardInterrupt):
             track_video(clip, filmed.head, tables[1], lens=LENS)
     assert track_video(clip, filmed.head, tables[1], lens=LENS, resume=True).resumed == 3

@@ -10,6 +10,7 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
 
+from mien.app.ready_head import ReadyHead
 from mien.app.track_files import OVERLAY, TrackFiles
 from mien.app.track_lens import LENS, find_focal
 from mien.app.track_run import TRACKING, TrackRun
@@ -101,14 +102,14 @@ def track_video(
         check_positive("smooth_seconds", smooth_seconds)
     facts = clip.facts()
     focal_px = None if lens is None else parse_lens(lens, facts.width, facts.height)
-    options = options or TrackOptions()
     notes = [STARTED_OVER] if journal_of(files.table).exists() and not resume else []
     with LandmarkDetector() as detector:
+        ready = ReadyHead(head, detector, options or TrackOptions())
         if focal_px is None:
-            focal_px, note = find_focal(clip, facts, head, options, detector, tell)
+            focal_px, note = find_focal(clip, facts, ready, tell)
             notes.append(note)
-        run = TrackRun(clip, facts, head, focal_px, max_side, options)
-        tracker = run.tracker(detector)
+        run = TrackRun(clip, facts, ready, focal_px, max_side)
+        tracker = run.tracker()
         journal, kept = run.journal(files.table, resume=resume)
         with journal:
             start = time.perf_counter()

@@ -6,15 +6,11 @@ from collections.abc import Iterator
 from itertools import islice
 from typing import TYPE_CHECKING
 
+from mien.app.ready_head import ReadyHead
 from mien.arrays import Array, UInt8
-from mien.capture.detector import LandmarkDetector
 from mien.capture.frames_ahead import frames_ahead
 from mien.capture.video import Video, VideoFacts
-from mien.model.head import Head
-from mien.track.face import TrackedFace
 from mien.track.focal import estimate_focal
-from mien.track.start import Starter
-from mien.track.tracker import TrackOptions
 
 if TYPE_CHECKING:
     from mien.build import Progress
@@ -25,20 +21,14 @@ _FIRST, _EVERY, _SIDE = 300, 5, 1280
 
 
 def find_focal(
-    clip: Video,
-    facts: VideoFacts,
-    head: Head,
-    options: TrackOptions,
-    detector: LandmarkDetector,
-    tell: Progress,
+    clip: Video, facts: VideoFacts, ready: ReadyHead, tell: Progress
 ) -> tuple[float, str]:
     """Focal length of a clip's pictures in px, from the first of them, and a note on it.
 
     Args:
         tell: told LENS, the frames done and their total.
     """
-    starter = Starter(head, TrackedFace(head, units=options.units).layout, detector)
-    found = estimate_focal(_first(clip, facts, tell), starter, head)
+    found = estimate_focal(_first(clip, facts, tell), ready.starter, ready.head)
     reduced = min(1.0, _SIDE / max(facts.width, facts.height))
     return found.focal_px / reduced, found.note
 

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from mien.app.ready_head import ReadyHead
 from mien.arrays import Array, UInt8
-from mien.capture.detector import LandmarkDetector
 from mien.capture.frames_ahead import frames_ahead
 from mien.capture.video import Video, VideoFacts
 from mien.formats.track_journal import Journal, journal_of, load_journal
 from mien.model.head import Head
 from mien.track.state import Layout, Track, TrackedFrame
-from mien.track.tracker import Tracker, TrackOptions
 
 if TYPE_CHECKING:
     from mien.build import Progress
@@ -48,21 +47,13 @@ class TrackRun:
 
     clip: Video
     facts: VideoFacts
-    head: Head
+    ready: ReadyHead
     focal_px: float
     max_side: int
-    options: TrackOptions
 
-    def tracker(self, detector: LandmarkDetector) -> VideoTracker:
+    def tracker(self) -> VideoTracker:
         """Before the first frame."""
-        return Tracker(
-            self.head,
-            self.facts.width,
-            self.facts.height,
-            focal_px=self.focal_px,
-            detector=detector,
-            options=self.options,
-        )
+        return self.ready.tracker(self.facts.width, self.facts.height, self.focal_px)
 
     def journal(self, output: Path, *, resume: bool) -> tuple[Journal, tuple[TrackedFrame, ...]]:
         """The journal of a new run, or of one that goes on with what was kept.
@@ -80,10 +71,10 @@ class TrackRun:
         return {
             "generator": f"mien {version('mien')}",
             "video": {"name": path.name, "bytes": path.stat().st_size},
-            "head": digest(self.head),
+            "head": digest(self.ready.head),
             "focal_px": self.focal_px,
             "max_side": self.max_side,
-            "options": asdict(self.options),
+            "options": asdict(self.ready.options),
         }
 
     def follow(
