@@ -88,7 +88,7 @@ def test_a_performance(told: Told) -> None:
     assert told.asked == 1
     for number, item in enumerate(found):
         assert (item.frame, item.time) == (number, number / FPS)
-        assert_truth(item, number, degrees=0.3, share=0.005, weights=0.05)
+        assert_truth(item, number, degrees=0.1, share=0.002, weights=0.02)
         assert item.seen > 0.9
         assert item.rms < 5
         assert item.deviations.shape == (len(tracker().layout.channels),)

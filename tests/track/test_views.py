@@ -19,8 +19,8 @@ def frame(value: int = 100) -> Array:
     return np.full((240, 320, 3), value, np.uint8)
 
 
-def cut(pixels: Array, points: Array = FACE) -> list[View]:
-    return cut_views(pixels, CAMERA, points, face_px=100.0, levels=3)
+def cut(pixels: Array, points: Array = FACE, *, face_px: float = 60.0) -> list[View]:
+    return cut_views(pixels, CAMERA, points, face_px=face_px, levels=3)
 
 
 def spot(view: View) -> Array:
@@ -47,12 +47,15 @@ def test_a_place_is_seen_where_the_view_says(rng: np.random.Generator) -> None:
 
 def test_each_view_is_half_of_the_one_before() -> None:
     views = cut(frame())
-    # 130 px of face are compared at 3/4 of their size.
-    assert views[0].focal == pytest.approx(0.75 * CAMERA.focal_px)
     for large, small in pairwise(views):
         assert large.size == (2 * small.size[0], 2 * small.size[1])
         assert large.focal == pytest.approx(2 * small.focal)
         assert (large.cx, large.cy) == pytest.approx((2 * small.cx, 2 * small.cy))
+
+
+@pytest.mark.parametrize(("face_px", "scale"), [(100, 1), (60, 0.5), (30, 0.25), (200, 1)])
+def test_a_large_face_is_halved_until_it_is_near_the_size(face_px: float, scale: float) -> None:
+    assert cut(frame(), face_px=face_px)[0].focal == pytest.approx(scale * CAMERA.focal_px)
 
 
 def test_a_small_face_stays_as_it_is() -> None:
