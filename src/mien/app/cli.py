@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from math import radians
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 
+from mien.app.cli_track import track
 from mien.app.options import (
     check_finite,
     parse_colour,
@@ -17,6 +17,7 @@ from mien.app.options import (
     parse_size,
     parse_state,
 )
+from mien.app.printing import Json, print_result
 from mien.app.progress import terminal_progress
 from mien.errors import MienError
 
@@ -32,7 +33,6 @@ Curves = Literal["epipolar", "arc-length"]
 Kernel = Literal["exponential", "biharmonic", "triharmonic", "thin_plate"]
 FillChoice = Literal["pyramid", "grow"]
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, no bars.")]
 Output = Annotated[Path, typer.Option("-o", "--output", help="Where the result goes.")]
 HeadFolder = Annotated[Path, typer.Argument(help="A head folder that `mien build` made.")]
 Yaw = Annotated[float, typer.Option(help="Degrees; the head turns to its own left.")]
@@ -49,7 +49,7 @@ def demo(
 
     with terminal_progress(json_) as progress:
         index = run_demo(output, progress=progress)
-    _print(json_, {"index": str(index)}, f"Open {index} in a browser.")
+    print_result(json_, {"index": str(index)}, f"Open {index} in a browser.")
 
 
 @app.command()
@@ -120,7 +120,7 @@ def build(
     )
     with terminal_progress(json_) as progress:
         result = build_head_folder(source, output, options=options, progress=progress)
-    _print(json_, summary_json(result, output), summary_text(result, output))
+    print_result(json_, summary_json(result, output), summary_text(result, output))
 
 
 @app.command()
@@ -180,7 +180,7 @@ def render(
     )
     save_image(output, picture)
     notes = renderer.rig.hull_notes(state)
-    _print(json_, {"output": str(output), "notes": notes}, str(output), notes)
+    print_result(json_, {"output": str(output), "notes": notes}, str(output), notes)
 
 
 @app.command()
@@ -199,13 +199,14 @@ def export(
     from mien.model.head import NEUTRAL
 
     export_head(load_head(head), output, expression=expression or NEUTRAL)
-    _print(json_, {"output": str(output), "bytes": output.stat().st_size}, str(output))
+    print_result(json_, {"output": str(output), "bytes": output.stat().st_size}, str(output))
 
 
 @app.command()
 def animate(
     timeline: Annotated[
-        Path, typer.Argument(help="A timeline (.json) or a Live Link Face recording (.csv).")
+        Path,
+        typer.Argument(help="A timeline (.json), a track (.csv), or a Live Link recording (.csv)."),
     ],
     output: Annotated[
         str,
@@ -250,7 +251,10 @@ def animate(
             progress=progress,
         )
     data = {"output": output, "frames": take.frames, "notes": take.notes}
-    _print(json_, data, f"{output}: {take.frames} frames", take.notes)
+    print_result(json_, data, f"{output}: {take.frames} frames", take.notes)
+
+
+app.command()(track)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -281,10 +285,3 @@ def _one_line(error: Exception) -> str:
 
 def _angle(name: str, degrees: float) -> float:
     return radians(check_finite(name, degrees))
-
-
-def _print(as_json: bool, data: dict[str, Any], text: str, notes: tuple[str, ...] = ()) -> None:
-    """The result on stdout; notes, which the JSON has in it, on stderr."""
-    print(json.dumps(data, indent=2) if as_json else text)
-    for note in () if as_json else notes:
-        print("note:", note, file=sys.stderr)

@@ -18,7 +18,7 @@ def live_line(quiet: bool) -> Iterator[Callable[[LiveStatus], None]]:
     if quiet or not console.is_terminal:
         yield lambda status: None
         return
-    with Live(console=console, transient=True) as line:
+    with Live("getting ready | Ctrl-C stops", console=console, transient=True) as line:
         yield lambda status: line.update(status_text(status))
 
 

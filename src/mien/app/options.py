@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite, radians
+from math import inf, isfinite, radians
 from typing import TYPE_CHECKING
 
 from mien.errors import InputError
@@ -19,6 +19,12 @@ def check_finite(name: str, value: float) -> float:
     if not isfinite(value):
         raise InputError(name, "a finite number", value)
     return value
+
+
+def check_seconds(name: str, value: float | None) -> None:
+    """Raises: InputError: no time that passes, if one is given at all."""
+    if value is not None and not 0 < value < inf:
+        raise InputError(name, "a number of seconds above 0", f"{value:g}")
 
 
 def parse_size(name: str, text: str) -> tuple[int, int]:

@@ -24,12 +24,12 @@ class HeadRenderer:
     """Draws one head in any state; what all its pictures share is prepared once.
 
     Attributes:
-        head: the head. rig: what poses its face.
+        head: the head. rig: what poses its face; one that is there already may be given.
     Raises: InputError: as Rig.
     """
 
-    def __init__(self, head: Head) -> None:
-        self.head, self.rig = head, Rig(head)
+    def __init__(self, head: Head, *, rig: Rig | None = None) -> None:
+        self.head, self.rig = head, rig or Rig(head)
 
     @cached_property
     def _renderer(self) -> MorphRenderer:
