@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Shaped, UInt8
+from jaxtyping import Bool, Float, Int, Shaped, UInt8, UInt16
 
 from mien.errors import InputError
 
@@ -20,6 +20,7 @@ __all__ = [
     "Int",
     "Shaped",
     "UInt8",
+    "UInt16",
     "check_array",
     "check_image",
     "check_positive",

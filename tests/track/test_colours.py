@@ -7,7 +7,7 @@ import pytest
 
 from mien.arrays import Array
 from mien.track.colours import Colours, match_colours
-from mien.track.drawing import LUMA
+from mien.track.grey import LUMA
 
 TRUE = Colours(np.array([1.2, 0.8, 0.95]), np.array([-12.0, 20.0, 3.0]))
 

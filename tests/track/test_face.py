@@ -101,8 +101,9 @@ def test_what_concerns_a_triangle(model: TrackedFace) -> None:
     """Lists of unknowns hold the pose's everywhere, and all that moves or mixes a corner."""
     answers = model.answers
     rng = np.random.default_rng(3)
-    for triangle in rng.integers(0, len(answers.active), 200):
-        active = answers.active[triangle, : answers.counts[triangle]]
+    for triangle in rng.integers(0, len(answers.triangles), 200):
+        row = answers.set_of[triangle]
+        active = answers.sets[row, : answers.sizes[row]]
         corners = answers.triangles[triangle]
         assert set(range(POSE_UNKNOWNS)) <= set(active.tolist())
         moved = np.linalg.norm(model.moves[:, corners], axis=2).max(axis=1) > 0.06

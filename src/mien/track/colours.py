@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mien.arrays import Array, Float
-from mien.track.drawing import LUMA
+from mien.track.grey import LUMA
 
 _GAIN_SD = 0.3
 """How far a camera's gain is from 1."""

@@ -139,10 +139,10 @@ def _with_layers(answers: Answers, numeric: Int[Array, " m"]) -> Answers:
     region, direction = answers.region.copy(), answers.direction.copy()
     region[numeric] = regions
     direction[numeric] = directions + np.arange(count)
-    triangles = len(answers.active)
     return Answers(
-        active=np.tile(np.arange(unknowns, dtype=np.int32), (triangles, 1)),
-        counts=np.full(triangles, unknowns, np.int32),
+        sets=np.arange(unknowns, dtype=np.int32)[None],
+        sizes=np.array([unknowns], np.int32),
+        set_of=np.zeros(len(answers.set_of), np.int32),
         region=region,
         direction=direction,
         Q=Q,

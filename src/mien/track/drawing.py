@@ -14,11 +14,8 @@ from mien.numeric.raster import Raster, rasterize
 from mien.numeric.threads import for_row_bands
 from mien.render.mipmap import Four, Pyramids, level_of_detail, place_lookup, weighted_texels
 from mien.render.mix import Painted
+from mien.track.grey import GreyPyramids, add_greys
 from mien.track.views import View
-
-LUMA = (0.299, 0.587, 0.114)
-"""Of red, green and blue (BT.601): faces are compared in shades of grey, which tells as much about
-them as their colours do at a third of the cost (docs/tracking.md)."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +55,7 @@ class Drawing(NamedTuple):
 
 def draw(
     painted: Painted,
+    grey: GreyPyramids,
     compared: Bool[Array, " f"],
     face: PosedFace,
     pose: Pose,
@@ -68,6 +66,7 @@ def draw(
     """The face as the view sees it, in shades of grey.
 
     Args:
+        grey: of the painted textures.
         layers: keep every expression's rendering; otherwise there are 0 of them.
     """
     places, ids, raster, shades = _placed(painted, face, pose, view)
@@ -75,12 +74,12 @@ def draw(
     count = face.weights.shape[1] if layers else 0
     out, luma = np.zeros((height, width, count), np.float32), np.zeros((height, width), np.float32)
     mask = np.empty((height, width), np.float32)
-    surface = (compared, painted.triangles, painted.uvs, painted.pyramids, shades)
+    surface = (compared, painted.triangles, painted.uvs, grey, shades)
 
     def rows(first: int, end: int) -> None:
         _shade_rows(ids, raster.barycentrics, *surface, first, end, mask, out, luma)
 
-    for_row_bands(rows, height, work=4 * width * height)
+    for_row_bands(rows, height, work=2 * width * height)
     return Drawing(ids, raster.barycentrics, raster.depth, places, mask, out, luma)
 
 
@@ -118,8 +117,9 @@ def _lookup(
     b: tuple[float, float, float],
     triangles: Array,
     uvs: Array,
-    pyramids: Pyramids,
+    pyramids: Pyramids | GreyPyramids,
     shades: Array,
+    dropped: int,
 ) -> tuple[Four, Four, float]:
     """Texels and their weights for a place in a triangle, and its brightness."""
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -127,7 +127,7 @@ def _lookup(
     v = b[0] * uvs[t, 0, 1] + b[1] * uvs[t, 1, 1] + b[2] * uvs[t, 2, 1]
     level = b[0] * shades[i, 0] + b[1] * shades[j, 0] + b[2] * shades[k, 0]
     bright = b[0] * shades[i, 1] + b[1] * shades[j, 1] + b[2] * shades[k, 1]
-    fine, coarse = place_lookup(pyramids, u, v, level)
+    fine, coarse = place_lookup(pyramids, u, v, level - dropped)
     return fine, coarse, bright
 
 
@@ -138,7 +138,7 @@ def _shade_rows(
     compared: Array,
     triangles: Array,
     uvs: Array,
-    pyramids: Pyramids,
+    grey: GreyPyramids,
     shades: Array,
     first: int,
     end: int,
@@ -147,6 +147,8 @@ def _shade_rows(
     luma: Array,
 ) -> None:
     """Fill in mask, layers and luma; ids that are not compared become -1."""
+    dropped = grey.dropped
+    greys = np.empty(grey.texels.shape[1], np.float32)
     for row in range(first, end):
         for col in range(ids.shape[1]):
             t = ids[row, col]
@@ -159,19 +161,17 @@ def _shade_rows(
             b1 = barycentrics[row, col, 1]
             b2 = barycentrics[row, col, 2]
             i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            fine, coarse, bright = _lookup(t, (b0, b1, b2), triangles, uvs, pyramids, shades)
-            total = 0.0
-            for n in range(shades.shape[1] - 2):
+            b = (b0, b1, b2)
+            fine, coarse, bright = _lookup(t, b, triangles, uvs, grey, shades, dropped)
+            add_greys(grey.texels, fine, coarse, greys)
+            total = np.float32(0.0)
+            for n in range(len(greys)):
                 c = 2 + n
                 weight = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]
-                if weight == 0.0 and out.shape[2] == 0:
-                    continue
-                red, green, blue = weighted_texels(pyramids.texels, n, fine, coarse)
-                grey = bright * (LUMA[0] * red + LUMA[1] * green + LUMA[2] * blue)
-                total += weight * grey
-                if out.shape[2]:
-                    out[row, col, n] = grey
-            luma[row, col] = total
+                total += weight * greys[n]
+            for n in range(out.shape[2]):
+                out[row, col, n] = bright * greys[n]
+            luma[row, col] = bright * total
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
@@ -197,7 +197,8 @@ def _colour_rows(
             b1 = barycentrics[row, col, 1]
             b2 = barycentrics[row, col, 2]
             i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            fine, coarse, bright = _lookup(t, (b0, b1, b2), triangles, uvs, pyramids, shades)
+            b = (b0, b1, b2)
+            fine, coarse, bright = _lookup(t, b, triangles, uvs, pyramids, shades, 0)
             for n in range(shades.shape[1] - 2):
                 c = 2 + n
                 weight = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]

@@ -1,8 +1,8 @@
 """Normal equations of the residual, summed up pixel by pixel: J itself is never stored.
 
 The residual is eps(p) = 1/2 sum w rho(I_t - I^) of P02 sec. 6.1.2, with a weight for each
-pixel and a robust rho where P02 has the square; J = G + B of eq. (7), G by Sobel's gradient of the drawn
-picture and the chain rule through projection, rotation and shape (app. B), B by those of the single
+pixel and a robust rho where P02 has the square; J = G + B of eq. (7), G by Sobel's gradient of the
+pictures and the chain rule through projection, rotation and shape (app. B), B by those of single
 expressions. What eq. (7) leaves to the reader: at a pixel that stays, a picture that moves to the
 right brings what was to its left, so G takes the gradient with a minus.
 """
@@ -20,8 +20,8 @@ from mien.numeric.threads import for_row_bands
 from mien.track.drawing import Drawing, Pose
 from mien.track.views import View
 
-_BLOCK = 8
-"""Rows summed up together: the same sums, whatever the number of threads."""
+_BLOCKS = 8
+"""Bands of rows that are summed up apart: the same sums, whatever the number of threads."""
 POSE_UNKNOWNS = 7
 """Rotation vector (applied from the left, P02 app. B.2), translation mm, log focal length."""
 
@@ -45,15 +45,18 @@ class Answers(NamedTuple):
     """Which of the N unknowns, the pose's seven and then the face's, concern which pixels.
 
     Attributes:
-        active, counts: (F, A) those that move or mix each triangle, in its first `counts`, (F,).
+        sets, sizes: (S, A) unknowns that concern the same triangles, in the first `sizes` (S,) of
+            a row.
+        set_of: (F,) which row is each triangle's.
         region: (N,) in which region the mixture of textures changes with it; -1 for none.
         direction: (N,) along which column of Q it does.
         Q: (K, L) float32, P02 eq. (4). masks: (V, R) float32 of the regions.
         triangles: (F, 3) vertex indices.
     """
 
-    active: Int[Array, "f a"]
-    counts: Int[Array, " f"]
+    sets: Int[Array, "s a"]
+    sizes: Int[Array, " s"]
+    set_of: Int[Array, " f"]
     region: Int[Array, " n"]
     direction: Int[Array, " n"]
     Q: Float[Array, "k l"]
@@ -80,7 +83,7 @@ def pose_equations(drawing: Drawing, comparison: Comparison, pose: Pose, view: V
     """Of the seven unknowns of the pose, over the plain pictures."""
     height, width = drawing.ids.shape
     focal = view.focal * pose.zoom
-    blocks = -(-height // _BLOCK)
+    blocks, tall = _BLOCKS, -(-height // _BLOCKS)
     matrices = np.zeros((blocks, POSE_UNKNOWNS, POSE_UNKNOWNS))
     vectors = np.zeros((blocks, POSE_UNKNOWNS))
     totals = np.zeros((blocks, 2))
@@ -94,8 +97,8 @@ def pose_equations(drawing: Drawing, comparison: Comparison, pose: Pose, view: V
                 comparison,
                 pose.t,
                 lens,
-                block * _BLOCK,
-                min(block * _BLOCK + _BLOCK, height),
+                block * tall,
+                min(block * tall + tall, height),
                 matrices[block],
                 vectors[block],
                 totals[block],
@@ -120,9 +123,9 @@ def band_equations(
         answers: which parameters concern which pixels.
     """
     height, width = drawing.ids.shape
-    count = flows.shape[1]
-    blocks = -(-height // _BLOCK)
-    matrices, vectors = np.zeros((blocks, count, count)), np.zeros((blocks, count))
+    blocks, tall = _BLOCKS, -(-height // _BLOCKS)
+    sets, most = answers.sets.shape
+    matrices, vectors = np.zeros((blocks, sets, most, most)), np.zeros((blocks, sets, most))
     totals = np.zeros((blocks, 2))
 
     def rows(first: int, end: int) -> None:
@@ -134,15 +137,31 @@ def band_equations(
                 layers,
                 flows,
                 answers,
-                block * _BLOCK,
-                min(block * _BLOCK + _BLOCK, height),
+                block * tall,
+                min(block * tall + tall, height),
                 matrices[block],
                 vectors[block],
                 totals[block],
             )
 
     for_row_bands(rows, blocks, work=8 * height * width)
-    return _summed(matrices, vectors, totals)
+    count = flows.shape[1]
+    matrix, vector = np.zeros((count, count)), np.zeros(count)
+    _scatter(matrices, vectors, answers.sets, answers.sizes, matrix, vector)
+    return _summed(matrix[None], vector[None], totals)
+
+
+@njit(cache=True, nogil=True)
+def _scatter(
+    matrices: Array, vectors: Array, sets: Array, sizes: Array, matrix: Array, vector: Array
+) -> None:
+    """Add the sums of all blocks and sets to those of all unknowns."""
+    for block in range(len(matrices)):
+        for s in range(len(sets)):
+            for a in range(sizes[s]):
+                vector[sets[s, a]] += vectors[block, s, a]
+                for b in range(a + 1):
+                    matrix[sets[s, a], sets[s, b]] += matrices[block, s, a, b]
 
 
 def _summed(matrices: Array, vectors: Array, totals: Array) -> Equations:
@@ -286,18 +305,18 @@ def _add_bands(
     answers: Answers,
     first: int,
     end: int,
-    matrix: Array,
-    vector: Array,
+    matrices: Array,
+    vectors: Array,
     totals: Array,
 ) -> None:
     drawn, target, weights, scale = comparison
-    active, counts, region, direction, Q, masks, triangles = answers
-    columns = np.empty(active.shape[1], np.float32)
+    sets, sizes, set_of, region, direction, Q, masks, triangles = answers
+    columns = np.empty(sets.shape[1])
     along = np.empty(Q.shape[1], np.float32)
     shares = np.empty(masks.shape[1], np.float32)
     for row in range(first, end):
         for col in range(ids.shape[1]):
-            weight = weights[row, col]
+            weight = np.float64(weights[row, col])
             if weight == 0.0 or not _whole(ids, row, col):
                 continue
             t = ids[row, col]
@@ -318,16 +337,16 @@ def _add_bands(
                     along[d] += Q[n, d] * layers[row, col, n]
             for n in range(masks.shape[1]):
                 shares[n] = b0 * masks[i, n] + b1 * masks[j, n] + b2 * masks[k, n]
-            for a in range(counts[t]):
-                p = active[t, a]
+            s = set_of[t]
+            for a in range(sizes[s]):
+                p = sets[s, a]
                 x = b0 * flows[i, p, 0] + b1 * flows[j, p, 0] + b2 * flows[k, p, 0]
                 y = b0 * flows[i, p, 1] + b1 * flows[j, p, 1] + b2 * flows[k, p, 1]
                 columns[a] = gx * x + gy * y
                 if region[p] >= 0:
                     columns[a] += shares[region[p]] * along[direction[p]]
-            for a in range(counts[t]):
-                p = active[t, a]
+            for a in range(sizes[s]):
                 own = weight * columns[a]
-                vector[p] += own * r
+                vectors[s, a] += own * r
                 for b in range(a + 1):
-                    matrix[p, active[t, b]] += own * columns[b]
+                    matrices[s, a, b] += own * columns[b]

@@ -18,6 +18,7 @@ from mien.model.head import Head
 from mien.render.mipmap import build_pyramids
 from mien.render.mix import prepare_painted
 from mien.track.equations import POSE_UNKNOWNS, Answers
+from mien.track.grey import grey_pyramids
 from mien.track.state import Layout
 
 REGIONS = ("mouth", "eyes", "forehead")
@@ -27,6 +28,7 @@ BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")
 _STILL = ("tongueOut", "mouthClose", "jawForward")
 """Units that a front view says too little of."""
 _EYEBALLS = ("left_eyeball", "right_eyeball")
+_LEAST_UNIT = 0.1
 _LEAST_MM = 0.05
 """A parameter that moves a vertex by less than this at 1 does not concern it."""
 
@@ -74,7 +76,7 @@ class TrackedFace:
     Attributes:
         layout: of its numbers.
         basis: between blending weights and parameters, P02 eq. (4).
-        painted: triangles that can be seen, with their textures.
+        painted: triangles that can be seen, with their textures; grey: these in grey.
         compared: (F,) bool: those of the face, whose pixels count.
         moves: (P, V, 3) mm by which a step of 1 in each parameter moves each vertex.
         answers: which unknowns concern which triangles.
@@ -96,6 +98,7 @@ class TrackedFace:
         self.basis = Basis.by_gram_schmidt(len(self.rig.names))
         mesh, self.compared = _seen(head.mesh, load_generic_head().regions)
         self.painted = prepare_painted(mesh, build_pyramids(self.rig.textures))
+        self.grey = grey_pyramids(self.painted.pyramids)
         self._masks = np.stack([self.rig.mask(region) for region in regions], axis=1)
         chosen = [head.unit_names.index(name) for name in units]
         moves = [*self._expression_moves(), *np.asarray(head.units[chosen], np.float64)]
@@ -119,8 +122,9 @@ class TrackedFace:
 
     def anchored(self, parameters: FaceParameters) -> Anchor:
         """The rig's face at these parameters."""
-        units = np.where(np.abs(parameters.units) > 0.1, parameters.units, 0.0)
-        parameters = FaceParameters(parameters.alpha, units, parameters.gaze)
+        # What is nothing but noise must not bring a photographed expression along (expressions.rig).
+        sure = np.where(np.abs(parameters.units) > _LEAST_UNIT, parameters.units, 0.0)
+        parameters = FaceParameters(parameters.alpha, sure, parameters.gaze)
         rows = self.weights(parameters)[:, 1:].tolist()
         expressions = {
             region: dict(zip(self.layout.expressions[1:], row, strict=True))
@@ -156,14 +160,15 @@ class TrackedFace:
         concerned[:mixing] |= self._masks.T[region[own]] > 0
         every = np.ones((POSE_UNKNOWNS, len(triangles)), bool)
         by_triangle = np.vstack([every, concerned[:, triangles].any(axis=2)]).T
-        counts = by_triangle.sum(axis=1)
-        active = np.argsort(~by_triangle, axis=1, kind="stable")[:, : counts.max()]
-        active, counts, region, direction = (
+        rows, set_of = np.unique(by_triangle, axis=0, return_inverse=True)
+        sizes = rows.sum(axis=1)
+        sets = np.argsort(~rows, axis=1, kind="stable")[:, : sizes.max()]
+        sets, sizes, set_of, region, direction = (
             frozen(np.ascontiguousarray(array, np.int32))
-            for array in (active, counts, region, direction)
+            for array in (sets, sizes, set_of.ravel(), region, direction)
         )
-        Q, masks = (np.asarray(array, np.float32) for array in (self.basis.Q, self._masks))
-        return Answers(active, counts, region, direction, frozen(Q), frozen(masks), triangles)
+        Q, masks = (frozen(array.astype(np.float32)) for array in (self.basis.Q, self._masks))
+        return Answers(sets, sizes, set_of, region, direction, Q, masks, triangles)
 
 
 def within_range(weights: Float[Array, "r k"]) -> Float[Array, "r k"]:

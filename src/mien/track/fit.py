@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mien.arrays import Array, Float, UInt8
+from mien.arrays import Array, Bool, Float, UInt8
 from mien.camera import Camera
 from mien.track.colours import Colours, match_colours
 from mien.track.drawing import Drawing, Pose, draw_colours
@@ -39,13 +39,14 @@ class FitOptions:
     Attributes:
         face_px: extent at which the face is compared; smaller ones stay as they are.
         levels: sizes of the picture, each half of the one before; 2 at least.
-        iterations: at most, in each phase; fewer on the finest size.
+        iterations: at most, in each phase. finest: the same on the finest size, the dearest.
         tolerance: relative fall of the cost at which a phase ends.
     """
 
     face_px: float = 150.0
     levels: int = 3
-    iterations: int = 3
+    iterations: int = 2
+    finest: int = 2
     tolerance: float = 1e-3
 
 
@@ -140,7 +141,8 @@ class FrameFit:
                 scale=scale,
                 face_px=face_px / 2**level,
             )
-            answer = self._solved(scene, answer.guess, belief, by_bands, self._both)
+            most = self.options.iterations if level else self.options.finest
+            answer = self._solved(scene, answer.guess, belief, by_bands, self._both, most=most)
             trust = _trust(scene, answer.drawing)
         return _fitted(scene, answer, colours)
 
@@ -173,7 +175,14 @@ class FrameFit:
         return match_colours(drawn, view.pixels, weights)
 
     def _solved(
-        self, scene: Scene, guess: Guess, belief: Belief, linearized: Linearize, free: Array
+        self,
+        scene: Scene,
+        guess: Guess,
+        belief: Belief,
+        linearized: Linearize,
+        free: Bool[Array, " n"],
+        *,
+        most: int | None = None,
     ) -> Answer:
         return solve(
             scene,
@@ -181,7 +190,7 @@ class FrameFit:
             belief,
             linearized=linearized,
             free=free,
-            iterations=self.options.iterations,
+            iterations=most or self.options.iterations,
             tolerance=self.options.tolerance,
         )
 

@@ -97,8 +97,16 @@ class Scene:
     def draw(self, guess: Guess, *, layers: bool) -> Drawing:
         """The face as guessed; with `layers`, every expression's picture apart."""
         face = self.model.posed(self.anchor, guess.face)
-        painted, compared = self.model.painted, self.model.compared
-        return draw(painted, compared, face, guess.pose, self.view, layers=layers)
+        model = self.model
+        return draw(
+            model.painted,
+            model.grey,
+            model.compared,
+            face,
+            guess.pose,
+            self.view,
+            layers=layers,
+        )
 
 
 Linearize = Callable[[Scene, Guess], tuple[Equations, Drawing]]

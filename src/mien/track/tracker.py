@@ -144,14 +144,13 @@ class Tracker:
     def _belief(self, guess: Guess, factor: float) -> Belief:
         """Around a guess; the factor widens it. Units and gaze tend to rest."""
         mixing, units = guess.face.alpha.size, len(guess.face.units)
-        face = [_WEIGHT_DEVIATION] * mixing + [_UNIT_DEVIATION] * units + [_GAZE_DEVIATION] * 2
-        deviations = factor * np.array([*_POSE_DEVIATIONS, *face])
+        usual = [_WEIGHT_DEVIATION] * mixing + [_UNIT_DEVIATION] * units + [_GAZE_DEVIATION] * 2
+        deviations = factor * np.array([*_POSE_DEVIATIONS, *usual])
         resting = np.s_[len(_POSE_DEVIATIONS) + mixing :]
         stays = 1 / (1 + (deviations[resting] / _REST_DEVIATION) ** 2)
         deviations[resting] *= np.sqrt(stays)
-        face = replace(
-            guess.face, units=stays[:-2] * guess.face.units, gaze=stays[-2:] * guess.face.gaze
-        )
+        tending, gaze = stays[:-2] * guess.face.units, stays[-2:] * guess.face.gaze
+        face = replace(guess.face, units=tending, gaze=gaze)
         return Belief(replace(guess, face=face), deviations)
 
     def _guess(self, state: TrackState) -> Guess:

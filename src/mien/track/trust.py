@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mien.arrays import Array, Float
@@ -23,7 +25,7 @@ def usual_difference(
     """Grey levels by which a pixel may be off and still count: three standard deviations."""
     squares = ((target - drawn) ** 2)[weights > 0.25]
     median = float(np.median(squares)) if squares.size else 0.0
-    return max(3.0 * np.sqrt(median / _MEDIAN_SQUARE), LEAST_SCALE)
+    return max(3.0 * math.sqrt(median / _MEDIAN_SQUARE), LEAST_SCALE)
 
 
 def patch_trust(

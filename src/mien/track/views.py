@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.camera import Camera
 
-_MARGIN = 0.3
+_MARGIN = 0.15
 """Of the face's extent, on every side: as far as it may move between two frames."""
 _BRIGHTEST = 253
 """Of a colour that is certain not to be cut off."""
@@ -71,7 +71,7 @@ def cut_views(
         size = (round(side[0] * scale), round(side[1] * scale))
         cut, inside = _reduced(cut, size), _reduced(inside, size)
         focal = camera.focal_px * scale
-        views.append(View(np.float32(cut), np.float32(inside), focal, float(cx), float(cy)))
+        views.append(View(cut, inside, focal, float(cx), float(cy)))
     return views
 
 
@@ -101,7 +101,7 @@ def _cut(pixels: Array, origin: Array, side: Array) -> tuple[Array, Array]:
     told = cv2.inRange(part, (0, 0, 0), (_BRIGHTEST,) * 3)
     cut = cv2.copyMakeBorder(part, *around, cv2.BORDER_REPLICATE)
     inside = cv2.copyMakeBorder(told, *around, cv2.BORDER_CONSTANT, value=0)
-    return np.float32(cut), np.float32(inside) / 255
+    return cut.astype(np.float32), inside.astype(np.float32) / 255
 
 
 def _reduced(image: Array, size: tuple[int, int]) -> Array:
