@@ -75,8 +75,14 @@ def _high(values: Array) -> float:
     return float(np.nanpercentile(values, 95))
 
 
-def measure(name: str, path: Path, head: Head, detector: LandmarkDetector) -> Clip:
-    """Track a clip and compare it with its own frames and with the detector."""
+def measure(
+    name: str, path: Path, head: Head, detector: LandmarkDetector, *, every: int = 1
+) -> Clip:
+    """Track a clip and compare it with its own frames and with the detector.
+
+    Args:
+        every: so many frames from one to the next that is drawn, which takes longest.
+    """
     video = Video(path)
     facts = video.facts()
     read = [(frame.seconds, frame.pixels()) for frame in video.frames()]
@@ -92,18 +98,18 @@ def measure(name: str, path: Path, head: Head, detector: LandmarkDetector) -> Cl
         alone,
         tuple(peer_faces(read)),
         _reprojection(track, renderer, alone),
-        _psnr(track, renderer, frames),
+        _psnr(track, renderer, frames, every),
     )
 
 
 def _psnr(
-    track: Track, renderer: HeadRenderer, frames: Sequence[UInt8[Array, "h w 3"]]
+    track: Track, renderer: HeadRenderer, frames: Sequence[UInt8[Array, "h w 3"]], every: int
 ) -> Float[Array, " n"]:
     values = np.full(len(frames), np.nan)
-    for index, (found, pixels) in enumerate(zip(track.frames, frames, strict=True)):
-        drawn = draw_tracked(renderer, track, found)
+    for index in range(0, len(frames), every):
+        drawn = draw_tracked(renderer, track, track.frames[index])
         if drawn is not None:
-            values[index] = face_psnr(pixels, drawn.picture, drawn.inside)
+            values[index] = face_psnr(frames[index], drawn.picture, drawn.inside)
     return values
 
 
@@ -252,6 +258,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.track_clips", description=__doc__)
     parser.add_argument("heads", type=Path, help="folder of heads by the names of the clips")
     parser.add_argument("clips", nargs="*", metavar="NAME[=PATH]", help="by default the six")
+    parser.add_argument(
+        "--every", type=int, default=1, help="frames from one whose PSNR is taken to the next"
+    )
     asked = parser.parse_args(arguments)
     named = [item.partition("=")[::2] for item in asked.clips]
     clips = {name: Path(path) if path else CLIPS[name] for name, path in named} or CLIPS
@@ -259,7 +268,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with LandmarkDetector() as detector:
         for name, path in clips.items():
             head = load_head(asked.heads / name)
-            clip = measure(name, path, head, detector)
+            clip = measure(name, path, head, detector, every=asked.every)
             faces.append(clip.row)
             trembles[name] = tremble(clip, HeadRenderer(head))
             print(faces[-1], file=sys.stderr)
