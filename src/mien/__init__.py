@@ -11,19 +11,25 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mien.animate.timeline import Timeline
     from mien.app.animate import Take, animate_head
+    from mien.app.track import Tracked, track_video
+    from mien.app.track_files import TrackFiles
     from mien.assets.generic import load_generic_head
     from mien.build import Build, BuildOptions, build_head
     from mien.camera import Camera
+    from mien.capture.detector import LandmarkDetector
     from mien.errors import EstimationError, FileFormatError, InputError, MienError
     from mien.expressions.rig import Rig
     from mien.expressions.state import FaceState, Gaze
     from mien.formats.export import export_head
     from mien.formats.head_folder import load_head, save_head
     from mien.formats.timeline_file import load_performance
+    from mien.formats.track_csv import load_track, write_track
     from mien.mesh import Mesh
     from mien.model.fit import FitOptions
     from mien.model.head import Head
     from mien.render.picture import HeadRenderer, render_head
+    from mien.track.state import Track, TrackedFrame, TrackState
+    from mien.track.tracker import Tracker, TrackOptions
 
 __version__: str
 
@@ -39,19 +45,30 @@ __all__ = [
     "Head",
     "HeadRenderer",
     "InputError",
+    "LandmarkDetector",
     "Mesh",
     "MienError",
     "Rig",
     "Take",
     "Timeline",
+    "Track",
+    "TrackFiles",
+    "TrackOptions",
+    "TrackState",
+    "Tracked",
+    "TrackedFrame",
+    "Tracker",
     "animate_head",
     "build_head",
     "export_head",
     "load_generic_head",
     "load_head",
     "load_performance",
+    "load_track",
     "render_head",
     "save_head",
+    "track_video",
+    "write_track",
 ]
 
 _HOMES = {
@@ -66,19 +83,30 @@ _HOMES = {
     "Head": "model.head",
     "HeadRenderer": "render.picture",
     "InputError": "errors",
+    "LandmarkDetector": "capture.detector",
     "Mesh": "mesh",
     "MienError": "errors",
     "Rig": "expressions.rig",
     "Take": "app.animate",
     "Timeline": "animate.timeline",
+    "Track": "track.state",
+    "TrackFiles": "app.track_files",
+    "TrackOptions": "track.tracker",
+    "TrackState": "track.state",
+    "Tracked": "app.track",
+    "TrackedFrame": "track.state",
+    "Tracker": "track.tracker",
     "animate_head": "app.animate",
     "build_head": "build",
     "export_head": "formats.export",
     "load_generic_head": "assets.generic",
     "load_head": "formats.head_folder",
     "load_performance": "formats.timeline_file",
+    "load_track": "formats.track_csv",
     "render_head": "render.picture",
     "save_head": "formats.head_folder",
+    "track_video": "app.track",
+    "write_track": "formats.track_csv",
 }
 
 
