@@ -70,6 +70,20 @@ def test_steps_from_the_truth_cancel(scene: Scene) -> None:
     np.testing.assert_allclose(found.vector, 0, atol=1e-2)
 
 
+def test_a_head_without_expressions() -> None:
+    """Units and gaze alone: nothing is mixed but by what is numeric."""
+    names = ("neutral",)
+    model = patterned.model(names)
+    truth = Guess(patterned.pose(), model.neutral)
+    scene = patterned.scene(truth, names=names)
+    numeric = unknowns_named(model.layout, ("pose", "jawOpen"))
+    step = np.zeros(len(numeric))
+    step[POSE_UNKNOWNS + model.layout.units.index("jawOpen")] = 0.05
+    found, _ = by_differences(numeric)(scene, truth.moved(step))
+    back = found.vector @ step / (step @ found.matrix @ step)
+    assert back == pytest.approx(-1, abs=0.2)
+
+
 def test_names() -> None:
     count = POSE_UNKNOWNS + 2 * 2 + 1 + 2
     assert unknowns_named(LAYOUT, ()).tolist() == [False] * count

@@ -1,8 +1,8 @@
 """P02's other way of computing the Jacobian: central differences of the drawn picture.
 
-Nothing is left out: contacts, occlusion and what a filter makes of a moving outline are all in it.
-It takes two more drawings for every unknown, where the analytic way takes none (docs/tracking.md
-compares them).
+Nothing that is drawn is left out: what hides what, what a filter makes of a moving outline, and, if
+asked for, contacts and shadows. It takes two more drawings for every unknown, where the analytic
+way takes none (docs/tracking.md compares them).
 """
 
 from __future__ import annotations
@@ -77,14 +77,12 @@ def unknowns_named(layout: Layout, names: Sequence[str]) -> Bool[Array, " n"]:
     Raises: InputError: another name.
     """
     directions = len(layout.expressions) - 1
-    owners = [*["pose"] * POSE_UNKNOWNS]
-    owners += [region for region in layout.regions for _ in range(directions)]
-    owners += [*layout.units, "gaze", "gaze"]
-    known = dict.fromkeys(("pose", *layout.regions, *layout.units, "gaze"))
+    counts = {"pose": POSE_UNKNOWNS} | dict.fromkeys(layout.regions, directions)
+    counts |= dict.fromkeys(layout.units, 1) | {"gaze": 2}
     for name in names:
-        if name not in known:
-            raise InputError("numeric", f"some of {', '.join(known)}", name)
-    return np.isin(owners, list(names))
+        if name not in counts:
+            raise InputError("numeric", f"some of {', '.join(counts)}", name)
+    return np.repeat([name in names for name in counts], list(counts.values()))
 
 
 def _anchored(scene: Scene, guess: Guess) -> Scene:

@@ -122,7 +122,7 @@ class TrackedFace:
 
     def anchored(self, parameters: FaceParameters) -> Anchor:
         """The rig's face at these parameters."""
-        # What is nothing but noise must not bring a photographed expression along (expressions.rig).
+        # What is noise alone must not bring a photographed expression along (expressions.rig).
         sure = np.where(np.abs(parameters.units) > _LEAST_UNIT, parameters.units, 0.0)
         parameters = FaceParameters(parameters.alpha, sure, parameters.gaze)
         rows = self.weights(parameters)[:, 1:].tolist()
