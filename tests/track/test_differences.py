@@ -76,9 +76,9 @@ def test_a_head_without_expressions() -> None:
     model = patterned.model(names)
     truth = Guess(patterned.pose(), model.neutral)
     scene = patterned.scene(truth, names=names)
-    numeric = unknowns_named(model.layout, ("pose", "jawOpen"))
+    numeric = unknowns_named(model.layout, ("pose", "browInnerUp"))
     step = np.zeros(len(numeric))
-    step[POSE_UNKNOWNS + model.layout.units.index("jawOpen")] = 0.05
+    step[POSE_UNKNOWNS + model.layout.units.index("browInnerUp")] = 0.1
     found, _ = by_differences(numeric)(scene, truth.moved(step))
     back = found.vector @ step / (step @ found.matrix @ step)
     assert back == pytest.approx(-1, abs=0.2)
