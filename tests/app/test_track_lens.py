@@ -37,4 +37,4 @@ def test_every_fifth_of_the_first_frames_is_looked_at(
     assert (focal_px, note) == (800.0, "a note"), "of the pictures at their full size"
     assert [picture.mean() for picture in seen] == pytest.approx([20, 70, 120], abs=3)
     assert {picture.shape for picture in seen} == {(24, 32, 3)}
-    assert told == [(LENS, 5, 12), (LENS, 10, 12), (LENS, 12, 12)]
+    assert told == [(LENS, 0, 12), (LENS, 5, 12), (LENS, 10, 12), (LENS, 12, 12)]

@@ -28,13 +28,14 @@ def find_focal(
     Args:
         tell: told LENS, the frames done and their total.
     """
-    found = estimate_focal(_first(clip, facts, tell), ready.starter, ready.head)
+    total = min(facts.frames or _FIRST, _FIRST)
+    tell(LENS, 0, total)  # at once: making the head ready takes seconds
+    found = estimate_focal(_first(clip, total, tell), ready.starter, ready.head)
     reduced = min(1.0, _SIDE / max(facts.width, facts.height))
     return found.focal_px / reduced, found.note
 
 
-def _first(clip: Video, facts: VideoFacts, tell: Progress) -> Iterator[UInt8[Array, "h w 3"]]:
-    total = min(facts.frames or _FIRST, _FIRST)
+def _first(clip: Video, total: int, tell: Progress) -> Iterator[UInt8[Array, "h w 3"]]:
     with frames_ahead(clip, max_side=_SIDE) as pictures:
         for picture in islice(pictures, 0, _FIRST, _EVERY):
             yield picture.pixels
