@@ -33,8 +33,8 @@ def for_row_bands(kernel: Callable[[int, int], object], rows: int, *, work: int)
         rows: how many there are.
         work: about how many pixels it costs, to decide whether threads are worth waking.
     """
-    threads = int(numba.get_num_threads())
-    if threads == 1 or work < _SERIAL_WORK:
+    threads = int(numba.get_num_threads()) if work >= _SERIAL_WORK else 1
+    if threads == 1:
         kernel(0, rows)
         return
     # More bands than threads: an image's busy rows are seldom spread evenly. Of little work, each

@@ -39,14 +39,14 @@ def band_pass(
     weighted = np.empty((*mask.shape, count + 3), np.float32)
     inputs = (layers, luma, target)
     for_row_bands(
-        lambda a, b: _weigh_rows(*inputs, inner, a, b, weighted), len(mask), work=weighted.size
+        lambda a, b: _weigh_rows(*inputs, inner, a, b, weighted), len(mask), work=weighted.size // 4
     )
     sums = cv2.blur(weighted, (width, width), borderType=cv2.BORDER_CONSTANT)
     bands = (np.empty_like(layers), np.empty_like(luma), np.empty_like(target))
     for_row_bands(
         lambda a, b: _subtract_rows(*inputs, mask, sums, a, b, *bands),
         len(mask),
-        work=weighted.size,
+        work=weighted.size // 4,
     )
     return bands
 

@@ -104,7 +104,7 @@ def pose_equations(drawing: Drawing, comparison: Comparison, pose: Pose, view: V
                 totals[block],
             )
 
-    for_row_bands(rows, blocks, work=8 * height * width)
+    for_row_bands(rows, blocks, work=2 * height * width)
     return _summed(matrices, vectors, totals)
 
 
@@ -144,7 +144,7 @@ def band_equations(
                 totals[block],
             )
 
-    for_row_bands(rows, blocks, work=8 * height * width)
+    for_row_bands(rows, blocks, work=2 * height * width)
     count = flows.shape[1]
     matrix, vector = np.zeros((count, count)), np.zeros(count)
     _scatter(matrices, vectors, answers.sets, answers.sizes, matrix, vector)

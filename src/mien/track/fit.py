@@ -40,7 +40,7 @@ class FitOptions:
         face_px: extent at which the face is compared; smaller ones stay as they are.
         levels: sizes of the picture, each half of the one before; 2 at least.
         iterations: at most, in each phase. finest: the same on the finest size, the dearest.
-        tolerance: relative fall of the cost at which a phase ends.
+        tolerance: relative fall of the cost at which a phase ends; on smaller sizes ten times it.
     """
 
     face_px: float = 150.0
@@ -141,8 +141,8 @@ class FrameFit:
                 scale=scale,
                 face_px=face_px / 2**level,
             )
-            most = self.options.iterations if level else self.options.finest
-            answer = self._solved(scene, answer.guess, belief, by_bands, self._both, most=most)
+            last = answer.guess
+            answer = self._solved(scene, last, belief, by_bands, self._both, finest=level == 0)
             trust = _trust(scene, answer.drawing)
         return _fitted(scene, answer, colours)
 
@@ -182,16 +182,18 @@ class FrameFit:
         linearized: Linearize,
         free: Bool[Array, " n"],
         *,
-        most: int | None = None,
+        finest: bool = False,
     ) -> Answer:
+        options = self.options
         return solve(
             scene,
             guess,
             belief,
             linearized=linearized,
             free=free,
-            iterations=most or self.options.iterations,
-            tolerance=self.options.tolerance,
+            iterations=options.finest if finest else options.iterations,
+            # A start for the next size need not be exact.
+            tolerance=options.tolerance if finest else 10 * options.tolerance,
         )
 
 
