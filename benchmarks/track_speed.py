@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -38,11 +39,12 @@ class Ran:
     """A command from its start to its end.
 
     Attributes:
-        seconds: altogether.
+        seconds: altogether. cpu: of all its threads together.
         memory: (N, 2) seconds since the start, and MiB that it held then.
     """
 
     seconds: float
+    cpu: float
     memory: Array
 
     @property
@@ -61,7 +63,7 @@ class Ran:
 
 def run(command: Sequence[object]) -> Ran:
     """Raises: CalledProcessError: it failed."""
-    begun = time.perf_counter()
+    begun, used = time.perf_counter(), _cpu_of_children()
     memory = [(0.0, 0.0)]
     with subprocess.Popen(list(map(str, command)), cwd=_ROOT, stdout=subprocess.DEVNULL) as process:
         while process.poll() is None:
@@ -73,7 +75,13 @@ def run(command: Sequence[object]) -> Ran:
     seconds = time.perf_counter() - begun
     if process.returncode:
         raise subprocess.CalledProcessError(process.returncode, process.args)
-    return Ran(seconds, np.array(memory))
+    return Ran(seconds, _cpu_of_children() - used, np.array(memory))
+
+
+def _cpu_of_children() -> float:
+    """Seconds of those that have ended."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def resident_mb(process: int) -> float:
@@ -130,6 +138,8 @@ HEADER = (
     "further frames, ms: mien",
     "MediaPipe",
     "mien / MediaPipe",
+    "CPU ms each: mien",
+    "MediaPipe",
     "peak MiB: mien",
     "MediaPipe",
 )
@@ -151,17 +161,32 @@ def compare(work: Path, clip: Path, head: Path, *, runs: int) -> str:
                 found.setdefault(f"mien {key}", []).append(ours)
                 found.setdefault(f"peer {key}", []).append(theirs)
                 print(f"{name} {key}: {ours.seconds:.2f} {theirs.seconds:.2f}", file=sys.stderr)
-        seconds = {k: statistics.median(r.seconds for r in v[1:]) for k, v in found.items()}
+        seconds, cpu = (
+            {
+                key: statistics.median(getattr(ran, what) for ran in rans[1:])
+                for key, rans in found.items()
+            }
+            for what in ("seconds", "cpu")
+        )
         peaks = [max(ran.peak_mb for ran in found[f"{who} whole"][1:]) for who in ("mien", "peer")]
-        rows.append([name, *_figures(seconds, count), *peaks])
+        each = _each(cpu, count)
+        rows.append([name, *_figures(seconds, count), *each, *peaks])
     return markdown_table(HEADER, rows)
 
 
 def _figures(seconds: dict[str, float], count: int) -> list[float]:
     mien, peer = seconds["mien whole"], seconds["peer whole"]
+    each = _each(seconds, count)
     starts = [seconds["mien one"], seconds["peer one"]]
-    each = [1000 * (w - s) / (count - 1) for w, s in zip((mien, peer), starts, strict=True)]
     return [count / mien, count / peer, mien / peer, *starts, *each, each[0] / each[1]]
+
+
+def _each(seconds: dict[str, float], count: int) -> list[float]:
+    """Milliseconds that a further frame takes, of mien and of its peer."""
+    return [
+        1000 * (seconds[f"{who} whole"] - seconds[f"{who} one"]) / (count - 1)
+        for who in ("mien", "peer")
+    ]
 
 
 def memory_over(work: Path, clip: Path, head: Path, count: int) -> str:
@@ -179,8 +204,9 @@ INTRO = (
     "face landmarker (video mode, blendshapes and pose) on the same file, decoded the same way. "
     "{clip}, played forward and backward; {names}; three regions. Medians of {runs} runs in "
     "processes of their own, the two programs in turn, on {cores} cores. A file of one frame tells "
-    "what starting takes; further frames are the rest. Load average before the start {before}, at "
-    "the end {after}."
+    "what starting takes; further frames are the rest, in seconds that pass and in CPU time of all "
+    "threads, which other work on the cores changes less. Load average before "
+    "the start {before}, at the end {after}."
 )
 
 

@@ -30,10 +30,10 @@ def test_wide_pictures_hold_the_clip_in_the_middle(tmp_path: Path) -> None:
 
 def test_growth_is_from_early_to_late() -> None:
     at = np.linspace(0, 10, 1001)
-    ran = Ran(10.0, np.column_stack([at, 100 + 5 * at]))
+    ran = Ran(10.0, 8.0, np.column_stack([at, 100 + 5 * at]))
     assert ran.growth_mb == pytest.approx(5 * 8, abs=0.2)
     assert ran.peak_mb == 150
-    assert Ran(10.0, np.column_stack([at, np.full(1001, 80.0)])).growth_mb == 0
+    assert Ran(10.0, 8.0, np.column_stack([at, np.full(1001, 80.0)])).growth_mb == 0
 
 
 def test_a_command_that_fails_says_so() -> None:
@@ -41,4 +41,5 @@ def test_a_command_that_fails_says_so() -> None:
         run([sys.executable, "-c", "raise SystemExit(3)"])
     ran = run([sys.executable, "-c", "import time; held = b'x' * 60_000_000; time.sleep(0.6)"])
     assert ran.seconds > 0.6
+    assert 0 < ran.cpu < ran.seconds
     assert ran.peak_mb > 55
