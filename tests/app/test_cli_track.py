@@ -235,6 +235,7 @@ def test_stopped_and_resumed(
     tracker.stops_at = 3
     stopped = mien(*command, tmp_path / "t.csv")
     assert (stopped.status, stopped.out) == (130, "")
+    assert "note: stopped; with --resume it goes on from here" in stopped.err
     assert not (tmp_path / "t.csv").exists()
     tracker.stops_at = None
     resumed = mien(*command, tmp_path / "t.csv", "--resume")

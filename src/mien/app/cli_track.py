@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -101,7 +103,7 @@ def track(
     elif files is not None:
         from mien.app.track import COUNTED, track_video
 
-        with terminal_progress(json_, counted=COUNTED) as progress:
+        with _told_of_resume(files.table), terminal_progress(json_, counted=COUNTED) as progress:
             tracked = track_video(
                 video,
                 load_head(head),
@@ -112,6 +114,19 @@ def track(
                 progress=progress,
             )
         _print(json_, output, asdict(tracked), str(tracked), tracked.notes)
+
+
+@contextmanager
+def _told_of_resume(table: Path) -> Iterator[None]:
+    """Whoever stops the block while there is something to resume is told so."""
+    from mien.formats.track_journal import journal_of
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        if journal_of(table).exists():
+            print("note: stopped; with --resume it goes on from here", file=sys.stderr)
+        raise
 
 
 def _check_together(
