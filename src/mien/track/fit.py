@@ -9,6 +9,7 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, UInt8
 from mien.camera import Camera
 from mien.track.colours import Colours, match_colours
+from mien.track.differences import by_differences, unknowns_named
 from mien.track.drawing import Drawing, Pose, draw_colours
 from mien.track.equations import POSE_UNKNOWNS
 from mien.track.face import Anchor, TrackedFace
@@ -24,7 +25,7 @@ from mien.track.phases import (
 )
 from mien.track.restart import better_start
 from mien.track.trust import LEAST_SCALE, patch_trust, usual_difference
-from mien.track.views import View, cut_views
+from mien.track.views import BRIGHTEST, View, cut_views
 
 _FIRST_SCALE = 60.0
 """Grey levels by which a pixel may be off before anything is fitted."""
@@ -40,6 +41,9 @@ class FitOptions:
         face_px: extent at which the face is compared; smaller ones stay as they are.
         levels: sizes of the picture, each half of the one before; 2 at least.
         iterations: at most, in each phase. finest: the same on the finest size, the dearest.
+        numeric: unknowns whose Jacobian is taken by central differences: "pose", a region, a unit,
+            "gaze". All are analytic by default: as good, and a tenth of the time
+            (docs/tracking.md).
         tolerance: relative fall of the cost at which a phase ends; on smaller sizes ten times it.
     """
 
@@ -48,6 +52,7 @@ class FitOptions:
     iterations: int = 2
     finest: int = 2
     tolerance: float = 1e-3
+    numeric: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -84,6 +89,8 @@ class FrameFit:
         unknowns = np.arange(POSE_UNKNOWNS + len(model.neutral.vector))
         self._pose = unknowns < POSE_UNKNOWNS - 1
         self._both = unknowns != POSE_UNKNOWNS - 1
+        numeric = unknowns_named(model.layout, options.numeric)
+        self._by_bands = by_differences(numeric) if numeric.any() else by_bands
         self._outline = np.unique(model.painted.triangles[model.compared])
 
     def fit(
@@ -92,7 +99,7 @@ class FrameFit:
         camera: Camera,
         start: Guess,
         belief: Belief,
-        colours: Colours,
+        colours: Colours | None = None,
     ) -> Fitted | None:
         """The frame's own guess, from a start that is near.
 
@@ -102,7 +109,7 @@ class FrameFit:
 
         Args:
             camera: of the frame, its lens; the pose in it does not matter.
-            belief: what is expected. colours: of the frame, as far as known.
+            belief: what is expected. colours: of the frame before, if there is one.
         Returns: None where the start shows no face in the frame.
         """
         anchor = self.model.anchored(start.face)
@@ -110,24 +117,26 @@ class FrameFit:
         if found is None:
             return None
         views, face_px = found
-        smallest = views[-1]
+        smallest, known = views[-1], colours or Colours()
         scene = Scene(
             self.model,
             anchor,
             smallest,
-            colours.luma_before(smallest.pixels),
+            known.luma_before(smallest.pixels),
             smallest.inside,
             _FIRST_SCALE,
             face_px / 2 ** (len(views) - 1),
         )
         guess = self._solved(scene, start, belief, by_plain_pictures, self._pose).guess
-        answer = self._solved(scene, guess, belief, by_bands, self._both)
+        answer = self._solved(scene, guess, belief, self._by_bands, self._both)
         elsewhere = better_start(scene, answer.guess, answer.drawing)
         if elsewhere is not None:
             # What a leap says does not follow from the frame before.
             belief = replace(belief, mean=replace(belief.mean, face=elsewhere.face))
-            answer = self._solved(scene, elsewhere, belief, by_bands, self._both)
-        colours = colours.towards(self._colours(scene, answer.guess), _COLOUR_PACE)
+            answer = self._solved(scene, elsewhere, belief, self._by_bands, self._both)
+        found_colours = self._colours(scene, answer.guess)
+        pace = 1.0 if colours is None else _COLOUR_PACE
+        known = known.towards(found_colours, pace)
         trust = smallest.inside
         for level in reversed(range(len(views) - 1)):
             view = views[level]
@@ -135,16 +144,18 @@ class FrameFit:
             scene = replace(
                 scene,
                 view=view,
-                target=colours.luma_before(view.pixels),
+                target=known.luma_before(view.pixels),
                 # What is not explained by now is something else than the face.
                 weights=view.inside if level else view.inside * _enlarged(trust, view),
                 scale=scale,
                 face_px=face_px / 2**level,
             )
-            last = answer.guess
-            answer = self._solved(scene, last, belief, by_bands, self._both, finest=level == 0)
+            start = answer.guess
+            answer = self._solved(
+                scene, start, belief, self._by_bands, self._both, finest=level == 0
+            )
             trust = _trust(scene, answer.drawing)
-        return _fitted(scene, answer, colours)
+        return _fitted(scene, answer, known)
 
     def _views(
         self, pixels: Array, camera: Camera, pose: Pose, anchor: Anchor
@@ -218,7 +229,11 @@ def _fitted(scene: Scene, answer: Answer, colours: Colours) -> Fitted:
     """How well the face explains the frame, over the pixels that count."""
     drawing = answer.drawing
     weights = scene.weights * drawing.mask
-    seen = float(weights.sum() / max(float(drawing.mask.sum()), 1.0))
+    shown = drawing.mask > 0
+    # Too bright to tell is neither covered nor outside of the frame.
+    untold = scene.view.pixels[shown & (scene.view.inside < 0.5)]
+    bright = np.count_nonzero(untold.max(axis=1) > BRIGHTEST) if len(untold) else 0
+    seen = float(weights.sum() / max(np.count_nonzero(shown) - bright, 1))
     chosen = weights > 0.25
     a, b = drawing.luma[chosen], scene.target[chosen]
     found = (answer.guess, answer.deviations, answer.information)

@@ -233,7 +233,9 @@ def solve(
     )
     _, found, drawing, _ = at(result.x)
     deviations = belief.deviations.copy()
-    information = normal(result.x)[0]
+    # Without D(p): that a weight is at the end of its range says nothing of how sure it is.
+    information = scale(found) * found.matrix[np.ix_(free, free)]
+    information += np.diag(belief.deviations[free] ** -2.0)
     deviations[free] = np.sqrt(np.diag(np.linalg.inv(information)))
     rms = float(np.sqrt(found.squares / max(found.weight, 1e-9)))
     return Answer(result.x, deviations, information, drawing, result.iterations, rms)

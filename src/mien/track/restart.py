@@ -18,8 +18,8 @@ _STANDS_OUT = 1.5
 """... if that is so many times the face's."""
 _BETTER = 0.85
 """Of the difference, squared: another start must bring it down to this."""
-_ASIDE = 0.4
-"""Radians: how far eyes look aside when they do."""
+_ASIDE, _DOWN = 0.4, 0.3
+"""Radians: how far eyes look aside, or down, when they do."""
 
 
 def better_start(scene: Scene, guess: Guess, drawing: Drawing) -> Guess | None:
@@ -43,23 +43,27 @@ def better_start(scene: Scene, guess: Guess, drawing: Drawing) -> Guess | None:
 
 def _candidates(model: TrackedFace, face: FaceParameters, region: int) -> Iterator[FaceParameters]:
     eyes = "eye" in model.layout.regions[region]
-    opened = _with_eyes(model, face, blink=0.0, yaw=0.0) if eyes else face
+    opened = _with_eyes(model, face) if eyes else face
     for weights in np.eye(len(model.layout.expressions)):
         alpha = opened.alpha.copy()
         alpha[region] = model.basis.alpha(weights)
         yield replace(opened, alpha=alpha)
     if eyes:
-        yield _with_eyes(model, face, blink=1.0, yaw=0.0)
-        for yaw in (0.0, -_ASIDE, _ASIDE):
-            yield _with_eyes(model, face, blink=0.0, yaw=yaw)
+        yield _with_eyes(model, face, blink=1.0)
+        for gaze in ((0.0, 0.0), (-_ASIDE, 0.0), (_ASIDE, 0.0), (0.0, -_DOWN)):
+            yield _with_eyes(model, face, gaze=gaze)
 
 
 def _with_eyes(
-    model: TrackedFace, face: FaceParameters, *, blink: float, yaw: float
+    model: TrackedFace,
+    face: FaceParameters,
+    *,
+    blink: float = 0.0,
+    gaze: tuple[float, float] = (0.0, 0.0),
 ) -> FaceParameters:
     units = face.units.copy()
     units[[name in BLINKS for name in model.layout.units]] = blink
-    return replace(face, units=units, gaze=np.array([yaw, 0.0]))
+    return replace(face, units=units, gaze=np.array(gaze))
 
 
 def _region_errors(scene: Scene, drawing: Drawing) -> Float[Array, " r"]:

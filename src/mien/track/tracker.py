@@ -135,7 +135,7 @@ class Tracker:
         guess = self._guess(state)
         # Twice: the detector's landmarks are some millimetres off.
         belief = self._belief(guess, 1.5)
-        first = self._fit.fit(pixels, camera, guess, belief, Colours())
+        first = self._fit.fit(pixels, camera, guess, belief)
         if first is None:
             return None
         belief = replace(belief, mean=first.guess)

@@ -12,7 +12,7 @@ from mien.camera import Camera
 
 _MARGIN = 0.15
 """Of the face's extent, on every side: as far as it may move between two frames."""
-_BRIGHTEST = 253
+BRIGHTEST = 253
 """Of a colour that is certain not to be cut off."""
 
 
@@ -98,7 +98,7 @@ def _cut(pixels: Array, origin: Array, side: Array) -> tuple[Array, Array]:
     part = pixels[low[1] : high[1], low[0] : high[0]]
     before, after = low - origin, origin + side - high
     around = (before[1], after[1], before[0], after[0])
-    told = cv2.inRange(part, (0, 0, 0), (_BRIGHTEST,) * 3)
+    told = cv2.inRange(part, (0, 0, 0), (BRIGHTEST,) * 3)
     cut = cv2.copyMakeBorder(part, *around, cv2.BORDER_REPLICATE)
     inside = cv2.copyMakeBorder(told, *around, cv2.BORDER_CONSTANT, value=0)
     return cut.astype(np.float32), inside.astype(np.float32) / 255
