@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mien.arrays import Array, Float, Int, UInt8
+from mien.arrays import Array, Float, UInt8
 from mien.camera import Camera
 from mien.capture.detector import LandmarkDetector
 from mien.model.head import Head
@@ -20,7 +20,7 @@ from mien.track.fit import FitOptions, Fitted, FrameFit
 from mien.track.phases import Belief, Guess
 from mien.track.start import Starter
 from mien.track.state import Layout, Status, TrackedFrame, TrackState
-from mien.track.steady import steady_step
+from mien.track.steady import Block, steady_step
 
 _POSE_DEVIATIONS = (0.1, 0.1, 0.1, 15.0, 15.0, 40.0, 0.3)
 """Rotation (rad), translation (mm), log focal length: how far a head may go in a frame."""
@@ -29,6 +29,9 @@ _WEIGHT_DEVIATION, _UNIT_DEVIATION, _GAZE_DEVIATION = 0.2, 0.25, 0.2
 keeps the least change."""
 _REST_DEVIATION = 0.4
 """How far units and gaze (rad) are from rest; what pictures do not tell goes back there."""
+_CLEAR_POSE, _CLEAR_FACE = 9.0, 3.0
+"""Standard deviations from which on a step is rather motion. Frames one after another err alike
+and more than they say where the head is, and its trembling is seen; a small smile must show."""
 _LEAST_LIKENESS, _LEAST_SEEN = 0.6, 0.3
 """Below these a face is lost: the drawn face does not look like the frame, or it is covered."""
 _USUAL_STEP = 1 / 25
@@ -211,8 +214,14 @@ def _if_like(fitted: Fitted | None) -> Fitted | None:
     return fitted
 
 
-def _blocks(model: TrackedFace) -> list[Int[Array, " m"]]:
+def _blocks(model: TrackedFace) -> list[Block]:
     """Of the unknowns without the focal length: the pose, each region, units, gaze."""
     alpha, units = model.neutral.alpha, len(model.layout.units)
-    sizes = [POSE_UNKNOWNS - 1, *([alpha.shape[1]] * len(alpha)), units, 2]
-    return np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])
+    pose = np.delete(_POSE_DEVIATIONS, POSE_UNKNOWNS - 1)
+    regions = [np.full(alpha.shape[1], _WEIGHT_DEVIATION)] * len(alpha)
+    face = [*regions, np.full(units, _UNIT_DEVIATION), np.full(2, _GAZE_DEVIATION)]
+    ends = np.cumsum([len(pose), *map(len, face)])
+    blocks = [Block(np.arange(len(pose)), pose, _CLEAR_POSE)]
+    for end, usual in zip(ends[1:], face, strict=True):
+        blocks.append(Block(np.arange(end - len(usual), end), usual, _CLEAR_FACE))
+    return blocks
