@@ -14,9 +14,9 @@ from mien.track.phases import Guess, Scene
 
 _SUSPICIOUS = 9.0
 """Grey levels of RMS difference in a region from which another start is looked for, ..."""
-_STANDS_OUT = 1.5
-"""... if that is so many times the face's."""
-_BETTER = 0.85
+_STANDS_OUT = 1.2
+"""... if that is so many times the rest of the face's."""
+_BETTER = 0.9
 """Of the difference, squared: another start must bring it down to this."""
 _ASIDE, _DOWN = 0.4, 0.3
 """Radians: how far eyes look aside, or down, when they do."""
@@ -28,14 +28,16 @@ def better_start(scene: Scene, guess: Guess, drawing: Drawing) -> Guess | None:
     Tried are the photographed expressions, one at a time in the region; in that of the eyes, open
     and shut lids and looks to the sides.
     """
-    errors = _region_errors(scene, drawing)
-    whole = _mean_square(scene, drawing)
+    sums, counts = _region_sums(scene, drawing)
+    errors = sums / np.maximum(counts, 1.0)
+    elsewhere = (sums.sum() - sums) / np.maximum(counts.sum() - counts, 1.0)
     found = None
-    for region in np.flatnonzero(errors > np.maximum(_SUSPICIOUS**2, _STANDS_OUT**2 * whole)):
+    for region in np.flatnonzero(errors > np.maximum(_SUSPICIOUS**2, _STANDS_OUT**2 * elsewhere)):
         best = errors[region] * _BETTER
         for face in _candidates(scene.model, (found or guess).face, int(region)):
             tried = replace(guess, face=face)
-            error = _region_errors(scene, scene.draw(tried, layers=False))[region]
+            sums, counts = _region_sums(scene, scene.draw(tried, layers=False))
+            error = sums[region] / max(counts[region], 1.0)
             if error < best:
                 best, found = error, tried
     return found
@@ -66,20 +68,13 @@ def _with_eyes(
     return replace(face, units=units, gaze=np.array(gaze))
 
 
-def _region_errors(scene: Scene, drawing: Drawing) -> Float[Array, " r"]:
-    """(R,) mean square difference in each region."""
+def _region_sums(scene: Scene, drawing: Drawing) -> tuple[Float[Array, " r"], Float[Array, " r"]]:
+    """(R,) sums of squared differences in each region, and how many pixels they are."""
     weights = scene.weights * drawing.mask
+    squares = weights * (drawing.luma - scene.target) ** 2
     regions = np.where(drawing.mask > 0, scene.model.region_of[drawing.ids], -1)
-    squares = weights * (drawing.luma - scene.target) ** 2
-    count = len(scene.model.layout.regions)
-    inside = regions >= 0
-    total = np.bincount(regions[inside], squares[inside], count)
-    whole = np.bincount(regions[inside], weights[inside], count)
-    errors: Array = total / np.maximum(whole, 1.0)
-    return errors
-
-
-def _mean_square(scene: Scene, drawing: Drawing) -> float:
-    weights = scene.weights * drawing.mask
-    squares = weights * (drawing.luma - scene.target) ** 2
-    return float(squares.sum() / max(float(weights.sum()), 1.0))
+    inside, count = regions >= 0, len(scene.model.layout.regions)
+    return (
+        np.bincount(regions[inside], squares[inside], count),
+        np.bincount(regions[inside], weights[inside], count),
+    )

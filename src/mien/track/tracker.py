@@ -46,10 +46,13 @@ class TrackOptions:
         fit: how a frame is.
         units: names of face units to track; by default blinks for a head with photographed
             expressions, and all that a front view shows for one without.
+        steady: whether steps that cannot be told from noise are taken in part only; off, every
+            frame stands for itself (docs/tracking-method.md).
     """
 
     fit: FitOptions = field(default_factory=FitOptions)
     units: tuple[str, ...] | None = None
+    steady: bool = True
 
 
 class Tracker:
@@ -83,6 +86,7 @@ class Tracker:
         self._starter = starter or Starter(head, self.layout, detector, rig=self._model.rig)
         self._camera = Camera(width, height, focal_px, np.eye(3), np.array([0.0, 0.0, 1000.0]))
         self._past: list[TrackedFrame] = []
+        self._steady = options.steady
         self._blocks = _blocks(self._model)
 
     def resume(self, frames: Sequence[TrackedFrame]) -> None:
@@ -117,7 +121,7 @@ class Tracker:
         belief = self._belief(guess, min(np.sqrt(elapsed), 3.0))
         colours = Colours(self._past[-1].gain, self._past[-1].bias)
         fitted = _if_like(self._fit.fit(pixels, camera, guess, belief, colours))
-        return None if fitted is None else self._steadied(fitted)
+        return fitted if fitted is None or not self._steady else self._steadied(fitted)
 
     def _steadied(self, fitted: Fitted) -> Fitted:
         """With no more motion since the frame before than can be told from noise."""
