@@ -146,12 +146,13 @@ class Tremble:
     peer: Jitter
     alone: Jitter
 
-    def row(self, measure: Callable[[Jitter], float]) -> list[float]:
+    def row(self, measure: Callable[[Jitter], float]) -> list[object]:
         """For the table of one measure."""
         mien, smoothed, peer, alone = map(
             measure, (self.mien, self.smoothed, self.peer, self.alone)
         )
-        return [alone, peer, mien, mien / peer, smoothed, smoothed / peer]
+        # Nothing trembles that is not told.
+        return [alone or "-", peer, mien, mien / peer, smoothed, smoothed / peer]
 
 
 def tremble(clip: Clip, renderer: HeadRenderer) -> Tremble:
