@@ -32,6 +32,8 @@ _REST_DEVIATION = 0.4
 _CLEAR_POSE, _CLEAR_FACE = 9.0, 3.0
 """Standard deviations from which on a step is rather motion. Frames one after another err alike
 and more than they say where the head is, and its trembling is seen; a small smile must show."""
+_MEASURED_DEVIATION = 0.08
+"""How far units and gaze (rad) lie from what the detector's landmarks say."""
 _LEAST_LIKENESS, _LEAST_SEEN = 0.6, 0.3
 """Below these a face is lost: the drawn face does not look like the frame, or it is covered."""
 _USUAL_STEP = 1 / 25
@@ -117,11 +119,22 @@ class Tracker:
         if not self._past or self._past[-1].state is None:
             return None
         guess = self._predicted(time)
+        if len(self.layout.expressions) == 1:
+            guess = self._with_landmarks(guess, pixels, camera)
         elapsed = max(time - self._past[-1].time, 1e-3) / _USUAL_STEP
         belief = self._belief(guess, min(np.sqrt(elapsed), 3.0))
         colours = Colours(self._past[-1].gain, self._past[-1].bias)
         fitted = _if_like(self._fit.fit(pixels, camera, guess, belief, colours))
         return fitted if fitted is None or not self._steady else self._steadied(fitted)
+
+    def _with_landmarks(self, guess: Guess, pixels: Array, camera: Camera) -> Guess:
+        """The face as the detector's landmarks have it.
+
+        Units move one texture about: of a mouth that was never photographed open, the picture says
+        too little.
+        """
+        state = self._starter.find(pixels, focal_px=camera.focal_px)
+        return guess if state is None else replace(guess, face=self._guess(state).face)
 
     def _steadied(self, fitted: Fitted) -> Fitted:
         """With no more motion since the frame before than can be told from noise."""
@@ -151,6 +164,9 @@ class Tracker:
     def _belief(self, guess: Guess, factor: float) -> Belief:
         """Around a guess; the factor widens it. Units and gaze tend to rest."""
         mixing, units = guess.face.alpha.size, len(guess.face.units)
+        if not mixing:
+            deviations = np.array([*_POSE_DEVIATIONS, *[_MEASURED_DEVIATION] * (units + 2)])
+            return Belief(guess, deviations)
         usual = [_WEIGHT_DEVIATION] * mixing + [_UNIT_DEVIATION] * units + [_GAZE_DEVIATION] * 2
         deviations = factor * np.array([*_POSE_DEVIATIONS, *usual])
         resting = np.s_[len(_POSE_DEVIATIONS) + mixing :]
