@@ -113,49 +113,40 @@ class FrameFit:
         Returns: None where the start shows no face in the frame.
         """
         anchor = self.model.anchored(start.face)
-        found = self._views(pixels, camera, start.pose, anchor)
-        if found is None:
+        cut = self._views(pixels, camera, start.pose, anchor)
+        if cut is None:
             return None
-        views, face_px = found
-        smallest, known = views[-1], colours or Colours()
+        views, face_px = cut
+        known, smallest = colours or Colours(), views[-1]
         scene = Scene(
-            self.model,
-            anchor,
-            smallest,
-            known.luma_before(smallest.pixels),
-            smallest.inside,
-            _FIRST_SCALE,
-            face_px / 2 ** (len(views) - 1),
+            model=self.model,
+            anchor=anchor,
+            view=smallest,
+            target=known.luma_before(smallest.pixels),
+            weights=smallest.inside,
+            scale=_FIRST_SCALE,
+            face_px=face_px / 2 ** (len(views) - 1),
         )
+        answer, belief = self._roughly(scene, start, belief)
+        pace = 1.0 if colours is None else _COLOUR_PACE
+        known = known.towards(self._colours(scene, answer.guess), pace)
+        for view in views[-2::-1]:
+            finest = view is views[0]
+            scene = _next_scene(scene, answer.drawing, view, known, finest=finest)
+            free, start = self._both, answer.guess
+            answer = self._solved(scene, start, belief, self._by_bands, free, finest=finest)
+        return _fitted(scene, answer, known)
+
+    def _roughly(self, scene: Scene, start: Guess, belief: Belief) -> tuple[Answer, Belief]:
+        """On the smallest size; and what is expected after it."""
         guess = self._solved(scene, start, belief, by_plain_pictures, self._pose).guess
         answer = self._solved(scene, guess, belief, self._by_bands, self._both)
         elsewhere = better_start(scene, answer.guess, answer.drawing)
-        if elsewhere is not None:
-            # What a leap says does not follow from the frame before.
-            belief = replace(belief, mean=replace(belief.mean, face=elsewhere.face))
-            answer = self._solved(scene, elsewhere, belief, self._by_bands, self._both)
-        found_colours = self._colours(scene, answer.guess)
-        pace = 1.0 if colours is None else _COLOUR_PACE
-        known = known.towards(found_colours, pace)
-        trust = smallest.inside
-        for level in reversed(range(len(views) - 1)):
-            view = views[level]
-            scale = _scale(scene, answer.drawing)
-            scene = replace(
-                scene,
-                view=view,
-                target=known.luma_before(view.pixels),
-                # What is not explained by now is something else than the face.
-                weights=view.inside if level else view.inside * _enlarged(trust, view),
-                scale=scale,
-                face_px=face_px / 2**level,
-            )
-            start = answer.guess
-            answer = self._solved(
-                scene, start, belief, self._by_bands, self._both, finest=level == 0
-            )
-            trust = _trust(scene, answer.drawing)
-        return _fitted(scene, answer, known)
+        if elsewhere is None:
+            return answer, belief
+        # What a leap says does not follow from the frame before.
+        belief = replace(belief, mean=replace(belief.mean, face=elsewhere.face))
+        return self._solved(scene, elsewhere, belief, self._by_bands, self._both), belief
 
     def _views(
         self, pixels: Array, camera: Camera, pose: Pose, anchor: Anchor
@@ -208,15 +199,27 @@ class FrameFit:
         )
 
 
-def _scale(scene: Scene, drawing: Drawing) -> float:
-    """Of the next size: by how much a pixel may be off."""
-    usual = usual_difference(drawing.luma, scene.target, scene.weights * drawing.mask)
-    return min(usual, scene.scale)
+def _next_scene(
+    scene: Scene, drawing: Drawing, view: View, colours: Colours, *, finest: bool
+) -> Scene:
+    """The next size, with what the drawing of this one tells of which pixels to believe.
 
-
-def _trust(scene: Scene, drawing: Drawing) -> Float[Array, "h w"]:
+    Only on the finest is what is still not explained taken to be something else than the face.
+    """
     weights = scene.view.inside * drawing.mask
-    return patch_trust(drawing.luma, scene.target, weights, face_px=scene.face_px)
+    usual = usual_difference(drawing.luma, scene.target, weights)
+    believed = view.inside
+    if finest:
+        trust = patch_trust(drawing.luma, scene.target, weights, face_px=scene.face_px)
+        believed = believed * _enlarged(trust, view)
+    return replace(
+        scene,
+        view=view,
+        target=colours.luma_before(view.pixels),
+        weights=believed,
+        scale=min(usual, scene.scale),
+        face_px=2 * scene.face_px,
+    )
 
 
 def _enlarged(trust: Float[Array, "h w"], view: View) -> Float[Array, "h w"]:
