@@ -21,8 +21,9 @@ from mien.numeric.rotation import angle_between
 from mien.track.colours import Colours
 from mien.track.differences import by_differences, unknowns_named
 from mien.track.drawing import Drawing, Pose
-from mien.track.equations import POSE_UNKNOWNS, Equations
+from mien.track.equations import Equations
 from mien.track.face import FaceParameters, TrackedFace
+from mien.track.flows import POSE_UNKNOWNS
 from mien.track.phases import Belief, Guess, Linearize, Scene, by_bands, solve
 from mien.track.views import View, cut_views
 

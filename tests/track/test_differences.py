@@ -8,7 +8,7 @@ import pytest
 import patterned
 from mien.errors import InputError
 from mien.track.differences import by_differences, unknowns_named
-from mien.track.equations import POSE_UNKNOWNS
+from mien.track.flows import POSE_UNKNOWNS
 from mien.track.phases import Guess, Scene
 from mien.track.state import Layout
 

@@ -13,7 +13,8 @@ import patterned
 from mien.arrays import Array
 from mien.track.differences import by_differences
 from mien.track.drawing import Drawing
-from mien.track.equations import POSE_UNKNOWNS, Comparison, Equations, pose_equations, screen_flows
+from mien.track.equations import Comparison, Equations, pose_equations
+from mien.track.flows import POSE_UNKNOWNS, screen_flows
 from mien.track.phases import Guess, Scene, by_bands, by_plain_pictures
 
 FACE = patterned.doing(

@@ -11,8 +11,8 @@ from mien.errors import InputError
 from mien.expressions.basis import WEIGHT_RANGE
 from mien.expressions.followers import part_vertices
 from mien.expressions.state import FaceState, Gaze
-from mien.track.equations import POSE_UNKNOWNS
 from mien.track.face import FaceParameters, TrackedFace, within_range
+from mien.track.flows import POSE_UNKNOWNS
 
 MIXED = patterned.doing(
     {"mouth": (0.5, 0.2), "forehead": (0.1, 0.4)}, units=(0.2, 0.3), gaze=(0.1, -0.05)

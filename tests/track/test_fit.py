@@ -12,8 +12,8 @@ from mien.arrays import Array
 from mien.numeric.rotation import angle_between
 from mien.track.colours import Colours
 from mien.track.drawing import Pose
-from mien.track.equations import POSE_UNKNOWNS
 from mien.track.fit import FitOptions, Fitted, FrameFit
+from mien.track.flows import POSE_UNKNOWNS
 from mien.track.phases import Belief, Guess
 
 WEIGHTS = {"mouth": (0.6, 0.1), "eyes": (0.1, 0.4), "forehead": (0.2, 0.5)}

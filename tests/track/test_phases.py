@@ -11,7 +11,7 @@ import patterned
 from mien.arrays import Array
 from mien.numeric.rotation import angle_between
 from mien.track.differences import by_differences
-from mien.track.equations import POSE_UNKNOWNS
+from mien.track.flows import POSE_UNKNOWNS
 from mien.track.phases import (
     LIMIT,
     Answer,

@@ -16,15 +16,9 @@ from mien.arrays import Array, Bool, Float, Int
 from mien.errors import InputError
 from mien.track.bands import band_pass, odd
 from mien.track.drawing import Drawing
-from mien.track.equations import (
-    POSE_UNKNOWNS,
-    Answers,
-    Comparison,
-    Equations,
-    band_equations,
-    screen_flows,
-)
+from mien.track.equations import Answers, Comparison, Equations, band_equations
 from mien.track.face import TrackedFace
+from mien.track.flows import POSE_UNKNOWNS, screen_flows
 from mien.track.phases import BAND, Guess, Linearize, Scene
 from mien.track.state import Layout
 

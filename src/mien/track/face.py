@@ -17,7 +17,8 @@ from mien.mesh import Mesh
 from mien.model.head import Head
 from mien.render.mipmap import build_pyramids
 from mien.render.mix import prepare_painted
-from mien.track.equations import POSE_UNKNOWNS, Answers
+from mien.track.equations import Answers
+from mien.track.flows import POSE_UNKNOWNS
 from mien.track.grey import grey_pyramids
 from mien.track.state import Layout
 

@@ -11,8 +11,8 @@ from mien.camera import Camera
 from mien.track.colours import Colours, match_colours
 from mien.track.differences import by_differences, unknowns_named
 from mien.track.drawing import Drawing, Pose, draw_colours
-from mien.track.equations import POSE_UNKNOWNS
 from mien.track.face import Anchor, TrackedFace
+from mien.track.flows import POSE_UNKNOWNS
 from mien.track.phases import (
     Answer,
     Belief,

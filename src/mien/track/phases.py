@@ -12,15 +12,9 @@ from mien.arrays import Array, Bool, Float
 from mien.numeric.lm import minimize_lm
 from mien.track.bands import band_pass, odd
 from mien.track.drawing import Drawing, Pose, draw
-from mien.track.equations import (
-    POSE_UNKNOWNS,
-    Comparison,
-    Equations,
-    band_equations,
-    pose_equations,
-    screen_flows,
-)
+from mien.track.equations import Comparison, Equations, band_equations, pose_equations
 from mien.track.face import Anchor, FaceParameters, TrackedFace
+from mien.track.flows import POSE_UNKNOWNS, screen_flows
 from mien.track.penalty import range_penalty
 from mien.track.views import View
 

@@ -14,9 +14,9 @@ from mien.model.head import Head
 from mien.numeric.rotation import rotation_from_vector, rotation_to_vector
 from mien.track.colours import Colours
 from mien.track.drawing import Pose
-from mien.track.equations import POSE_UNKNOWNS
 from mien.track.face import FaceParameters, TrackedFace
 from mien.track.fit import FitOptions, Fitted, FrameFit
+from mien.track.flows import POSE_UNKNOWNS
 from mien.track.phases import Belief, Guess
 from mien.track.start import Starter
 from mien.track.state import Layout, Status, TrackedFrame, TrackState
