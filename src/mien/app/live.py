@@ -145,8 +145,11 @@ def track_live(
         tell: told after every packet.
         clock: the source's.
     """
+    from threadpoolctl import threadpool_limits
+
     meter = _Meter()
-    with closing(source.frames()) as pictures, suppress(KeyboardInterrupt):
+    one_thread = threadpool_limits(1, user_api="blas")
+    with one_thread, closing(source.frames()) as pictures, suppress(KeyboardInterrupt):
         for picture in pictures:
             if seconds is not None and picture.seconds >= seconds:
                 break

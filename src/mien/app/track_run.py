@@ -89,10 +89,14 @@ class TrackRun:
         Args:
             tell: told TRACKING, the frames done and their total.
         """
+        from threadpoolctl import threadpool_limits
+
         frames, stated = list(kept), self.facts.frames
         tracker.resume(frames)
         tell(TRACKING, len(frames), stated)
-        with frames_ahead(self.clip, start=len(frames), max_side=self.max_side) as pictures:
+        ahead = frames_ahead(self.clip, start=len(frames), max_side=self.max_side)
+        # BLAS' own threads, waiting for more of its small products, would take the kernels' cores.
+        with threadpool_limits(1, user_api="blas"), ahead as pictures:
             for picture in pictures:
                 # The clock of a joined clip may jump back; a track's does not.
                 seconds = max(picture.seconds, frames[-1].time if frames else 0.0)
