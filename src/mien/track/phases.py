@@ -24,6 +24,8 @@ SAY = 2000.0
 """How many independent observations a face's pixels are, however many: neighbours err alike."""
 LIMIT = 200.0
 """c of P02's D(p), in units of the cost: a weight that is 0.1 out of range costs 2."""
+_FARTHEST_GAZE = np.array([0.55, 0.4])
+"""Radians to the sides, and up or down."""
 _LEAST_NOISE = 0.5
 """Grey levels: nothing is believed to be drawn better than this."""
 
@@ -253,6 +255,8 @@ def _prior(model: TrackedFace, guess: Guess, belief: Belief) -> _Prior:
     Q = model.basis.Q
     rows = [(row, Q) for row in model.basis.weights(guess.face.alpha)]
     rows.append((guess.face.units, np.eye(len(guess.face.units))))
+    # Eyes turn no farther, and lids hide what would tell.
+    rows.append((0.5 + guess.face.gaze / 2 / _FARTHEST_GAZE, np.diag(0.5 / _FARTHEST_GAZE)))
     start = POSE_UNKNOWNS
     for weights, directions in rows:
         own = slice(start, start + directions.shape[1])

@@ -31,7 +31,9 @@ def better_start(scene: Scene, guess: Guess, drawing: Drawing) -> Guess | None:
     sums, counts = _region_sums(scene, drawing)
     errors = sums / np.maximum(counts, 1.0)
     elsewhere = (sums.sum() - sums) / np.maximum(counts.sum() - counts, 1.0)
-    found = None
+    found = _with_calm_eyes(scene, guess, errors)
+    if found is not None:
+        return found
     for region in np.flatnonzero(errors > np.maximum(_SUSPICIOUS**2, _STANDS_OUT**2 * elsewhere)):
         best = errors[region] * _BETTER
         for face in _candidates(scene.model, (found or guess).face, int(region)):
@@ -41,6 +43,17 @@ def better_start(scene: Scene, guess: Guess, drawing: Drawing) -> Guess | None:
             if error < best:
                 best, found = error, tried
     return found
+
+
+def _with_calm_eyes(scene: Scene, guess: Guess, errors: Float[Array, " r"]) -> Guess | None:
+    """Straight ahead, where eyes that look aside explain the picture no better."""
+    if np.abs(guess.face.gaze).max() < _ASIDE / 3:
+        return None
+    eyes = ["eye" in region for region in scene.model.layout.regions]
+    calm = replace(guess, face=replace(guess.face, gaze=np.zeros(2)))
+    sums, counts = _region_sums(scene, scene.draw(calm, layers=False))
+    better = (sums / np.maximum(counts, 1.0))[eyes].sum() < errors[eyes].sum()
+    return calm if better else None
 
 
 def _candidates(model: TrackedFace, face: FaceParameters, region: int) -> Iterator[FaceParameters]:
