@@ -12,7 +12,7 @@ from mien.track.drawing import Drawing
 from mien.track.face import BLINKS, FaceParameters, TrackedFace
 from mien.track.phases import Guess, Scene
 
-_SUSPICIOUS = 9.0
+_SUSPICIOUS = 12.0
 """Grey levels of RMS difference in a region from which another start is looked for, ..."""
 _STANDS_OUT = 1.2
 """... if that is so many times the rest of the face's."""
