@@ -39,9 +39,11 @@ def for_row_bands(kernel: Callable[[int, int], object], rows: int, *, work: int)
         return
     # More bands than threads: an image's busy rows are seldom spread evenly. Of little work, each
     # band more would cost what it evens out.
-    bands = min(rows, threads * (4 if work > 20 * _SERIAL_WORK else 2))
+    bands = min(rows, threads * (4 if work > 20 * _SERIAL_WORK else 1))
     edges = [rows * band // bands for band in range(bands + 1)]
-    tasks = [_pool(threads).submit(kernel, *edges[band : band + 2]) for band in range(bands)]
+    tasks = [_pool(threads).submit(kernel, *edges[band : band + 2]) for band in range(1, bands)]
+    # This thread would only wait.
+    kernel(*edges[:2])
     for task in tasks:
         task.result()
 
