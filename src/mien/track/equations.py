@@ -9,6 +9,7 @@ right brings what was to its left, so G takes the gradient with a minus.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -82,28 +83,14 @@ def pose_equations(drawing: Drawing, comparison: Comparison, pose: Pose, view: V
     """Of the seven unknowns of the pose, over the plain pictures."""
     height, width = drawing.ids.shape
     focal = view.focal * pose.zoom
-    blocks, tall = _BLOCKS, -(-height // _BLOCKS)
-    matrices = np.zeros((blocks, POSE_UNKNOWNS, POSE_UNKNOWNS))
-    vectors = np.zeros((blocks, POSE_UNKNOWNS))
-    totals = np.zeros((blocks, 2))
-    lens = (focal, view.cx, view.cy)
+    matrices = np.zeros((_BLOCKS, POSE_UNKNOWNS, POSE_UNKNOWNS))
+    vectors, totals = np.zeros((_BLOCKS, POSE_UNKNOWNS)), np.zeros((_BLOCKS, 2))
+    inputs = (drawing.ids, drawing.depth, comparison, pose.t, (focal, view.cx, view.cy))
 
-    def rows(first: int, end: int) -> None:
-        for block in range(first, end):
-            _add_pose(
-                drawing.ids,
-                drawing.depth,
-                comparison,
-                pose.t,
-                lens,
-                block * tall,
-                min(block * tall + tall, height),
-                matrices[block],
-                vectors[block],
-                totals[block],
-            )
+    def add(block: int, first: int, end: int) -> None:
+        _add_pose(*inputs, first, end, matrices[block], vectors[block], totals[block])
 
-    for_row_bands(rows, blocks, work=2 * height * width)
+    _in_blocks(add, height, width)
     return _summed(matrices, vectors, totals)
 
 
@@ -122,32 +109,30 @@ def band_equations(
         answers: which parameters concern which pixels.
     """
     height, width = drawing.ids.shape
-    blocks, tall = _BLOCKS, -(-height // _BLOCKS)
     sets, most = answers.sets.shape
-    matrices, vectors = np.zeros((blocks, sets, most, most)), np.zeros((blocks, sets, most))
-    totals = np.zeros((blocks, 2))
+    matrices, vectors = np.zeros((_BLOCKS, sets, most, most)), np.zeros((_BLOCKS, sets, most))
+    totals = np.zeros((_BLOCKS, 2))
+    inputs = (drawing.ids, drawing.barycentrics, comparison, layers, flows, answers)
 
-    def rows(first: int, end: int) -> None:
-        for block in range(first, end):
-            _add_bands(
-                drawing.ids,
-                drawing.barycentrics,
-                comparison,
-                layers,
-                flows,
-                answers,
-                block * tall,
-                min(block * tall + tall, height),
-                matrices[block],
-                vectors[block],
-                totals[block],
-            )
+    def add(block: int, first: int, end: int) -> None:
+        _add_bands(*inputs, first, end, matrices[block], vectors[block], totals[block])
 
-    for_row_bands(rows, blocks, work=2 * height * width)
+    _in_blocks(add, height, width)
     count = flows.shape[1]
     matrix, vector = np.zeros((count, count)), np.zeros(count)
     _scatter(matrices, vectors, answers.sets, answers.sizes, matrix, vector)
     return _summed(matrix[None], vector[None], totals)
+
+
+def _in_blocks(add: Callable[[int, int, int], None], height: int, width: int) -> None:
+    """Call add(block, first_row, end_row) for every block of rows."""
+    tall = -(-height // _BLOCKS)
+
+    def blocks(first: int, end: int) -> None:
+        for block in range(first, end):
+            add(block, block * tall, min(block * tall + tall, height))
+
+    for_row_bands(blocks, _BLOCKS, work=2 * height * width)
 
 
 @njit(cache=True, nogil=True)

@@ -228,10 +228,10 @@ def solve(
         max_failures=1,
     )
     _, found, drawing, _ = at(result.x)
-    deviations = belief.deviations.copy()
     # Without D(p): that a weight is at the end of its range says nothing of how sure it is.
     information = scale(found) * found.matrix[np.ix_(free, free)]
     information += np.diag(belief.deviations[free] ** -2.0)
+    deviations = belief.deviations.copy()
     deviations[free] = np.sqrt(np.diag(np.linalg.inv(information)))
     rms = float(np.sqrt(found.squares / max(found.weight, 1e-9)))
     return Answer(result.x, deviations, information, drawing, result.iterations, rms)
