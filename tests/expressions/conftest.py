@@ -27,16 +27,29 @@ class Rigged:
     units: Array
     mechanics: Mechanics
 
+    def weights(self, **weights: float) -> Array:
+        """(52,) the units' weights."""
+        given = np.zeros(len(self.units))
+        for name, weight in weights.items():
+            given[load_generic_head().unit_names.index(name)] = weight
+        return given
+
     def posed(self, **weights: float) -> Array:
         """(V, 3) mm: the units added up, nothing else."""
-        names = load_generic_head().unit_names
-        added = [weight * self.units[names.index(name)] for name, weight in weights.items()]
-        vertices: Array = self.neutral + np.sum(added, axis=0)
+        vertices: Array = self.neutral + np.tensordot(self.weights(**weights), self.units, axes=1)
         return vertices
 
-    def living(self, **weights: float) -> Array:
+    def moved(self, gaze: tuple[float, float] = (0.0, 0.0), **weights: float) -> Array:
+        """(V, 3) mm: with turning eyes, contacts unresolved. Gaze is yaw and pitch, radians."""
+        motion = self.mechanics.motion(self.weights(**weights), np.array(gaze))
+        vertices = self.neutral.copy()
+        self.mechanics.offsets.add(motion.weights, vertices)
+        self.mechanics.look.turn(vertices, motion.angles)
+        return vertices
+
+    def living(self, gaze: tuple[float, float] = (0.0, 0.0), **weights: float) -> Array:
         """(V, 3) mm: with turning eyes and contacts."""
-        return self.mechanics.applied(self.posed(**weights), weights)
+        return self.mechanics.contacts.resolved(self.moved(gaze, **weights))
 
 
 def both(name: str, weight: float = 1.0) -> dict[str, float]:

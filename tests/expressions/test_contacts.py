@@ -31,12 +31,6 @@ def test_the_input_is_not_written_to(rigged: Rigged) -> None:
     assert np.abs(resolved - posed).max() > 0.5
 
 
-def test_contacts_can_be_switched_off(rigged: Rigged) -> None:
-    weights = {"eyeBlinkLeft": 1.0, "eyeSquintLeft": 1.0}
-    posed = rigged.posed(**weights)
-    assert rigged.mechanics.applied(posed, weights, contacts=False) is posed
-
-
 def test_a_mouth_closes_only_as_far_as_the_jaw_is_open(rigged: Rigged) -> None:
     alone = rigged.living(mouthClose=1.0)
     np.testing.assert_allclose(alone, rigged.neutral, atol=1e-5)
@@ -55,12 +49,25 @@ def test_what_is_taken_over_is_said() -> None:
 def test_lashes_go_with_the_lid(rigged: Rigged) -> None:
     posed = rigged.posed(eyeBlinkLeft=1.0, eyeLookDownLeft=1.0)
     moved = rigged.mechanics.contacts.resolved(posed) - posed
-    followers = Followers.of(GENERIC)
+    followers = rigged.mechanics.contacts.followers
     lashes = np.isin(followers.vertices, part_vertices(GENERIC, "lashes"))
     skin = moved[followers.carriers[lashes]]
     assert np.abs(moved[followers.vertices[lashes]]).max() > 0.5
     assert (moved[followers.vertices[lashes]] <= skin.max(axis=1) + 1e-9).all()
     assert (moved[followers.vertices[lashes]] >= skin.min(axis=1) - 1e-9).all()
+
+
+def test_followers_that_nothing_carries_are_left_out(rigged: Rigged) -> None:
+    contacts = rigged.mechanics.contacts
+    touching = [*contacts.lids, contacts.lips.upper, contacts.lips.lower]
+    moves = np.zeros_like(rigged.neutral)
+    moves[np.concatenate([item.vertices for item in touching])] = [1.0, 2.0, 3.0]
+    whole, some = Followers.of(GENERIC), contacts.followers
+    expected = np.zeros_like(moves)
+    expected[whole.vertices] = whole.carried(moves)
+    moved = expected.any(axis=1)
+    np.testing.assert_array_equal(np.flatnonzero(moved), some.vertices)
+    np.testing.assert_allclose(some.carried(moves), expected[moved])
 
 
 def test_bad_vertices_are_refused() -> None:

@@ -113,13 +113,3 @@ def test_a_side_has_shares_of_its_own() -> None:
 def test_neutral_alone_brings_nothing() -> None:
     alone = Explanations.of(WEIGHTS[:1], units(), offsets()[:1] * 0, MASKS)
     assert alone.driven(np.ones(4)).shape == (3, 0)
-    np.testing.assert_array_equal(alone.residuals(np.zeros((40, 0))), np.zeros((40, 3)))
-
-
-def test_residuals_come_along_by_their_shares() -> None:
-    shares = np.zeros((40, 3))
-    shares[:5, 0], shares[5:8, 2] = 0.4, 1
-    moved = KNOWN.residuals(shares)
-    np.testing.assert_allclose(moved[:5], 0.4 * KNOWN.left_over[1, :5])
-    np.testing.assert_allclose(moved[5:8], KNOWN.left_over[3, 5:8])
-    assert not moved[8:].any()

@@ -7,7 +7,6 @@ import pytest
 
 from mien.assets.generic import load_generic_head
 from mien.expressions.gaze import LOOK_UNITS, Eyeball, Look, look_angles
-from mien.expressions.state import Gaze
 
 if TYPE_CHECKING:
     from conftest import Rigged
@@ -54,7 +53,7 @@ def test_an_eyeball_that_is_not_round_stays_within_its_surface() -> None:
 
 def test_straight_ahead_changes_nothing(rigged: Rigged) -> None:
     posed = rigged.posed(jawOpen=0.2)
-    assert rigged.mechanics.look.applied(posed, {"jawOpen": 0.2}, Gaze()) is posed
+    np.testing.assert_allclose(rigged.moved(jawOpen=0.2), posed, rtol=0, atol=1e-12)
     eyeball = rigged.mechanics.look.eyeballs[0]
     points = posed[eyeball.vertices]
     assert eyeball.turned(points, 0.0, 0.0) is points
@@ -66,30 +65,26 @@ def test_units_and_gaze_drive_the_same_turn(rigged: Rigged) -> None:
         look_angles(GENERIC)[name] for name in ("eyeLookInLeft", "eyeLookOutRight")
     )
     weights = {"eyeLookInLeft": 0.5, "eyeLookOutRight": 0.5 * yaw_in / yaw_out}
-    by_units = look.applied(rigged.posed(**weights), weights, Gaze())
-    by_gaze = look.applied(rigged.neutral, {}, Gaze(yaw=0.5 * yaw_in))
+    by_units = rigged.moved(**weights)
+    by_gaze = rigged.moved((0.5 * yaw_in, 0.0))
     for eyeball in look.eyeballs:
         np.testing.assert_allclose(by_units[eyeball.vertices], by_gaze[eyeball.vertices], atol=1e-5)
 
 
 def test_at_weight_one_the_offsets_are_the_turn(rigged: Rigged) -> None:
     for name in LOOK_UNITS:
-        posed = rigged.posed(**{name: 1.0})
-        turned = rigged.mechanics.look.applied(posed, {name: 1.0}, Gaze())
-        np.testing.assert_allclose(turned, posed, atol=1e-5)
+        weights = {name: 1.0}
+        np.testing.assert_allclose(rigged.moved(**weights), rigged.posed(**weights), atol=1e-5)
 
 
 def test_upper_lids_follow_the_pupil(rigged: Rigged) -> None:
     lid = GENERIC.polylines["left_upper_eyelid"][3]
-    heights = [
-        rigged.mechanics.applied(rigged.neutral, {}, Gaze(pitch=np.radians(angle)))[lid, 1]
-        for angle in (-15, -5, 0, 5)
-    ]
+    heights = [rigged.living((0.0, np.radians(angle)))[lid, 1] for angle in (-15, -5, 0, 5)]
     assert np.all(np.diff(heights) > 0.2)
 
 
 def test_far_down_the_eye_is_still_open(rigged: Rigged) -> None:
-    down = rigged.mechanics.applied(rigged.neutral, {}, Gaze(pitch=np.radians(-25)))
+    down = rigged.living((0.0, np.radians(-25)))
     for lids in rigged.mechanics.contacts.lids:
         opening = -lids.overlap(lids.places(down)) * lids.eyeball.radius
         assert opening.max() > 1.0

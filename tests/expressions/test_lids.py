@@ -96,6 +96,37 @@ def test_lids_without_contact_are_left_alone(rigged: Rigged) -> None:
         assert resolve_lids(lids, rigged.neutral) is None
 
 
+def resolved_by_rounds(lids: Lids, vertices: np.ndarray) -> np.ndarray:
+    """(L, 3) mm: either lid gives way by half, over and over; then out of the eyeball."""
+    places = before = lids.places(vertices)
+    pressed = np.zeros(lids.upper)
+    for _ in range(4):
+        too_far = np.maximum(lids.overlap(places) - lids.full_overlap, 0)
+        back = lids.spread(places, too_far) / 2
+        places = places + np.outer(np.where(lids.on_upper, back, -back), [0, 1, 0])
+        pressed += too_far
+    upper, lower = lids.edges(places)
+    wanted = np.interp(upper[:, 0], np.maximum.accumulate(lower[:, 0]), lower[:, 2])
+    firmly = np.minimum(pressed * lids.eyeball.radius / 0.5, 1)
+    off = (wanted + lids.full_overlap * 0.15 / 0.35 - upper[:, 2]) * firmly
+    places[:, 2] += lids.spread(places, off) * lids.on_upper
+    places[:, 2] = np.maximum(places[:, 2], lids.least)
+    return lids.at(places) - lids.at(before)
+
+
+@pytest.mark.parametrize(("blink", "squint"), [(1.0, 1.0), (0.8, 0.6), (0.4, 0.0), (1.4, 0.0)])
+def test_lids_give_way_by_half_each(rigged: Rigged, blink: float, squint: float) -> None:
+    weights = {"eyeBlinkLeft": blink, "eyeBlinkRight": blink, "eyeSquintLeft": squint}
+    posed = rigged.posed(**weights, eyeLookDownLeft=0.7, cheekSquintRight=0.5)
+    for lids in rigged.mechanics.contacts.lids:
+        moved = resolve_lids(lids, posed)
+        assert blink < 1 or moved is not None
+        moved = np.zeros((len(lids.vertices), 3)) if moved is None else moved
+        np.testing.assert_allclose(moved, resolved_by_rounds(lids, posed), atol=1e-4)
+        again = resolve_lids(lids, posed + np.array([3.0, -2.0, 5.0]))
+        np.testing.assert_allclose(0 if again is None else again, moved, atol=1e-9)
+
+
 def test_places_and_back(rigged: Rigged) -> None:
     lids = Lids.of(GENERIC, rigged.neutral, "left")
     again = lids.at(lids.places(rigged.neutral))

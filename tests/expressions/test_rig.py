@@ -9,9 +9,10 @@ from marbled import GENERIC, at
 from mien.arrays import Array
 from mien.errors import InputError
 from mien.expressions.followers import part_vertices
-from mien.expressions.gaze import Eyeball
+from mien.expressions.gaze import Eyeball, look_angles
 from mien.expressions.regions import default_masks
-from mien.expressions.rig import Rig
+from mien.expressions.rig import REGIONS as MIXED_REGIONS
+from mien.expressions.rig import Rig, region_rows
 from mien.expressions.state import FaceState, Gaze, PosedFace
 from mien.mesh import Mesh
 from mien.model.head import Expression, Head
@@ -245,6 +246,36 @@ def test_gaze_turns_the_eyes_of_any_face() -> None:
     eyeball = Eyeball.of(GENERIC, REST, "right")
     expected = eyeball.turned(REST[eyeball.vertices], 0.2, 0.1)
     np.testing.assert_allclose(face.vertices[eyeball.vertices], expected, atol=1e-6)
+
+
+def test_eyes_of_an_expression_turn_on_when_a_unit_turns_them() -> None:
+    face = posed(FaceState({"face": {"anger": 1.0}}, {"eyeLookUpLeft": 0.6}))
+    eyeball = Eyeball.of(GENERIC, REST, "left")
+    yaw, pitch = ANGER_GAZE[0]
+    expected = eyeball.turned(REST[eyeball.vertices], yaw, pitch)
+    expected = eyeball.turned(expected, *np.multiply(0.6, look_angles(GENERIC)["eyeLookUpLeft"]))
+    np.testing.assert_allclose(face.vertices[eyeball.vertices], expected, atol=1e-6)
+
+
+def test_numbers_make_the_face_of_the_state_that_they_stand_for() -> None:
+    state = FaceState({"mouth": {"awe": 0.6}, "face": {"joy": 0.3}}, {"jawOpen": 0.4}, Gaze(0.2))
+    mouth, rest = [0.4, 0, 0, 0.6], [0.7, 0.3, 0, 0]
+    rows = region_rows(("mouth", "face"))
+    np.testing.assert_array_equal(rows, [1, 1, 2, 2, 2, 2, 2])
+    by_region = np.array([only("neutral"), mouth, rest])[rows]
+    units = 0.4 * np.eye(len(RIG.unit_names))[RIG.unit_names.index("jawOpen")]
+    numbers, face = RIG.posed(by_region, units, np.array([0.2, 0.0])), RIG.evaluate(state)
+    for field in ("vertices", "weights", "brightness"):
+        np.testing.assert_allclose(getattr(numbers, field), getattr(face, field), atol=1e-9)
+
+
+def test_regions_obey_the_nearest_around_them() -> None:
+    given = ("eyes", "left_mouth", "forehead")
+    assert MIXED_REGIONS[-1] == "face"
+    np.testing.assert_array_equal(region_rows(given), [2, 0, 1, 1, 3, 3, 0])
+    np.testing.assert_array_equal(region_rows(()), np.zeros(7))
+    with pytest.raises(InputError, match=r"region: expected .* such as mouth, got muoth"):
+        region_rows(("muoth",))
 
 
 def test_eyes_darken_as_their_lids_close() -> None:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from mien.arrays import Array, Float, check_array, frozen
+from mien.arrays import Array, Float, check_array
 from mien.assets.generic import GenericHead
 from mien.expressions.followers import Followers
-from mien.expressions.gaze import LOOK_UNITS, SIDES, Look, turn_eyeballs
+from mien.expressions.gaze import LOOK_UNITS, SIDES, Look, Motion, turn_eyeballs
 from mien.expressions.lids import Lids, close_lids, resolve_lids
 from mien.expressions.lips import Lips, part_lips, resolve_lips
-from mien.expressions.state import Gaze
+from mien.expressions.offsets import SparseOffsets
 from mien.expressions.transfer import transfer_units
 
 
@@ -25,7 +24,7 @@ class Contacts:
     Attributes:
         lids: of the left and the right eye.
         lips: upper and lower.
-        followers: the lashes and the hair, which go with the lids.
+        followers: of lashes and hair what goes with the lids and the lips.
     """
 
     lids: tuple[Lids, Lids]
@@ -37,7 +36,9 @@ class Contacts:
         """For a head with these neutral vertices, (V, 3) mm. Raises: InputError: shape, NaN."""
         vertices = check_array("vertices", vertices, generic.mesh.vertices.shape)
         left, right = (Lids.of(generic, vertices, side) for side in SIDES)
-        return Contacts((left, right), Lips.of(generic, vertices), Followers.of(generic))
+        lips, followers = Lips.of(generic, vertices), Followers.of(generic)
+        touching = [item.vertices for item in (left, right, lips.upper, lips.lower)]
+        return Contacts((left, right), lips, followers.of_skin(np.concatenate(touching)))
 
     def resolved(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
         """(V, 3) mm with every contact resolved; the same array where there is none."""
@@ -56,17 +57,20 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Mechanics:
-    """The motions of one head that are no sum of offsets: turning eyes, and contacts.
+    """How units, gaze and contacts move one head.
 
     Attributes:
         look: how the eyes turn.
         contacts: what must not pass through what.
-        close: (V, 3) mm, the offsets of mouthClose.
+        offsets: of the units; the eyeLook units' leave the eyeballs to be turned.
+        jaw, close: which units jawOpen and mouthClose are.
     """
 
     look: Look
     contacts: Contacts
-    close: Float[Array, "v 3"]
+    offsets: SparseOffsets
+    jaw: int
+    close: int
 
     taken_over: ClassVar[tuple[str, ...]] = (*LOOK_UNITS, "mouthClose")
     """Units that do something else than add their offsets: eyeballs turn, and a mouth can be
@@ -82,31 +86,19 @@ class Mechanics:
         """
         units = check_array("units", units, generic.unit_offsets.shape)
         vertices = check_array("vertices", vertices, generic.mesh.vertices.shape)
-        close = frozen(units[generic.unit_names.index("mouthClose")])
-        return Mechanics(Look.of(generic, vertices, units), Contacts.of(generic, vertices), close)
+        look = Look.of(generic, vertices)
+        offsets = SparseOffsets.of(look.without_eyeballs(units))
+        jaw, close = (generic.unit_names.index(name) for name in ("jawOpen", "mouthClose"))
+        return Mechanics(look, Contacts.of(generic, vertices), offsets, jaw, close)
 
-    def applied(
-        self,
-        vertices: Float[Array, "v 3"],
-        units: Mapping[str, float],
-        gaze: Gaze | None = None,
-        *,
-        contacts: bool = True,
-    ) -> Float[Array, "v 3"]:
-        """(V, 3) mm: the face as it looks and touches; the same array where it does neither.
+    def motion(self, units: Float[Array, " u"], gaze: Float[Array, " 2"]) -> Motion:
+        """What the units' weights and a gaze (yaw and pitch, radians) come to.
 
-        Args:
-            vertices: (V, 3) mm, the neutral or any mixed face with all units added as offsets,
-                those of `taken_over` too.
-            units: weights by name.
-            gaze: in addition to what the units say; the lids go along.
-            contacts: off where a face is to be as it was photographed.
+        Lids go with the gaze, and a mouth closes as far as its jaw is open.
         """
-        idle = units.get("mouthClose", 0.0) - max(units.get("jawOpen", 0.0), 0.0)
-        if idle > 0:
-            vertices = vertices - idle * self.close
-        vertices = self.look.applied(vertices, units, gaze or Gaze())
-        return self.contacts.resolved(vertices) if contacts else vertices
+        motion = self.look.motion(units, gaze)
+        motion.weights[self.close] -= max(units[self.close] - max(units[self.jaw], 0.0), 0.0)
+        return motion
 
 
 def fit_units(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[Array, "52 v 3"]:

@@ -3,15 +3,58 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from mien.arrays import Array, Float
+from mien.arrays import Array, Bool, Float, Int, frozen
 
 LEAST_SHARE = 0.05
 """Of a unit's whole movement: a region where it moves less has nothing to do with it."""
 _SPARING = 0.05
 """Ridge on how far expressions come along: of two that would do, both a little."""
+_TOGETHER = 100.0
+"""Weight of the condition that shares sum to 1."""
+
+
+@dataclass(frozen=True)
+class RegionUnits:
+    """The units of one region's expressions, made ready for being told apart.
+
+    Attributes:
+        expressions: (n,) those that have units here, counted without neutral.
+        units: (U,) bool, those that any of them has.
+        R: (n + 1, n + 1) upper triangular, and Q: (n + 1, U + 1) with orthonormal rows, without
+            zeros' columns: least squares for n shares and what is missing to 1 of them.
+    """
+
+    expressions: Int[Array, " n"]
+    units: Bool[Array, " u"]
+    R: Float[Array, "m m"]
+    Q: Float[Array, "m u+1"]
+
+    @classmethod
+    def of(cls, known: Float[Array, "k-1 u"]) -> RegionUnits:
+        """From the weights of the units in each expression but neutral."""
+        used = np.flatnonzero((known**2).sum(axis=1) > 1e-6)
+        count = len(used)
+        # One more unknown takes what is missing to 1, so that together they are at most 1.
+        sum_to_one = np.full(count + 1, _TOGETHER)
+        rows = np.column_stack([known[used].T, np.zeros(known.shape[1])])
+        ridge = np.column_stack([_SPARING * np.eye(count), np.zeros(count)])
+        Q, R = np.linalg.qr(np.vstack([rows, sum_to_one, ridge]))
+        answers = known.shape[1] + 1
+        return cls(used, (known != 0).any(axis=0), frozen(R), frozen(Q[:answers].T.copy()))
+
+    def shares(self, units: Float[Array, " u"]) -> Float[Array, " n"]:
+        """(n,) from 0 up and at most 1 together, whose units are nearest to these."""
+        from scipy.optimize import nnls
+
+        wanted = units * self.units
+        if not wanted.any() or not len(self.expressions):
+            return np.zeros(len(self.expressions))
+        shares: Array = nnls(self.R, self.Q @ np.append(wanted, _TOGETHER))[0][:-1]
+        return shares
 
 
 @dataclass(frozen=True)
@@ -54,32 +97,12 @@ class Explanations:
         In each region the mixture of expressions, weights from 0 up and at most 1 together, whose
         units are nearest to these.
         """
-        from scipy.optimize import nnls
-
-        regions, expressions, _ = self.by_region.shape
-        driven = np.zeros((regions, expressions - 1))
-        if expressions == 1 or not units.any():
-            return driven
-        for region, known in enumerate(self.by_region[:, 1:]):
-            wanted = units * (known != 0).any(axis=0)
-            used = (known**2).sum(axis=1) > 1e-6
-            if not wanted.any() or not used.any():
-                continue
-            count = int(used.sum())
-            # One more unknown takes what is missing to 1, so that together they are at most 1.
-            sum_to_one = np.full(count + 1, _TOGETHER)
-            rows = np.column_stack([known[used].T, np.zeros(known.shape[1])])
-            ridge = np.column_stack([_SPARING * np.eye(count), np.zeros(count)])
-            matrix = np.vstack([rows, ridge, sum_to_one])
-            right = np.concatenate([wanted, np.zeros(count), [_TOGETHER]])
-            driven[region, used] = nnls(matrix, right)[0][:-1]
+        driven = np.zeros((len(self.by_region), len(self.left_over) - 1))
+        if units.any():
+            for region, known in enumerate(self._regions):
+                driven[region, known.expressions] = known.shares(units)
         return driven
 
-    def residuals(self, driven: Float[Array, "v k-1"]) -> Float[Array, "v 3"]:
-        """(V, 3) mm that come along, by how far each expression does at each vertex."""
-        moved: Array = np.einsum("vk,kvc->vc", driven, self.left_over[1:])
-        return moved
-
-
-_TOGETHER = 100.0
-"""Weight of the condition that shares sum to 1."""
+    @cached_property
+    def _regions(self) -> list[RegionUnits]:
+        return [RegionUnits.of(known[1:]) for known in self.by_region]

@@ -47,7 +47,13 @@ class Followers:
         weights /= weights.sum(axis=1, keepdims=True)
         return Followers(frozen(vertices), frozen(skin[nearest]), frozen(weights))
 
+    def of_skin(self, vertices: Int[Array, " s"]) -> Followers:
+        """Those alone that any of these skin vertices carry."""
+        some = np.isin(self.carriers, vertices).any(axis=1)
+        parts = (self.vertices, self.carriers, self.weights)
+        return Followers(*(frozen(part[some]) for part in parts))
+
     def carried(self, offsets: Float[Array, "*k v 3"]) -> Float[Array, "*k n 3"]:
         """(..., N, 3) what offsets of the skin add to the followers."""
-        moved: Array = (offsets[..., self.carriers, :] * self.weights[..., None]).sum(axis=-2)
+        moved: Array = np.einsum("...nic,ni->...nc", offsets[..., self.carriers, :], self.weights)
         return moved

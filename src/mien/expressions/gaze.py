@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numba import njit
 
-from mien.arrays import Array, Float, Int, check_array, frozen
+from mien.arrays import Array, Float, Int, frozen
 from mien.assets.generic import GenericHead
 from mien.expressions.followers import part_vertices
-from mien.expressions.state import Gaze
-from mien.numeric.rotation import rotation_from_vector
 
 SIDES = ("left", "right")
 _LAG = 0.35
@@ -51,9 +50,14 @@ class Eyeball:
         """mm: that of the sphere of the same volume."""
         return float(np.abs(np.linalg.det(self.shape)) ** (1 / 3))
 
+    @cached_property
+    def inverse(self) -> Float[Array, "3 3"]:
+        """Of the shape."""
+        return frozen(np.linalg.inv(self.shape))
+
     def on_sphere(self, points: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
         """(N, 3) the points where the eyeball is the unit sphere around the origin."""
-        inside: Array = (points - self.centre) @ np.linalg.inv(self.shape).T
+        inside: Array = (points - self.centre) @ self.inverse.T
         return inside
 
     def turned(self, points: Float[Array, "n 3"], yaw: float, pitch: float) -> Float[Array, "n 3"]:
@@ -63,20 +67,29 @@ class Eyeball:
         of: a round eyeball turns rigidly, one that is not slides along its own surface, so that
         the lids on it stay where they are.
         """
-        towards = np.array(
-            [np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)]
-        )
-        before, after = np.linalg.solve(self.shape, np.column_stack([[0, 0, 1], towards])).T
-        axis = np.cross(before, after)
-        sine = float(np.linalg.norm(axis))
-        if sine == 0:
+        if yaw == 0 and pitch == 0:
             return points
-        angle = np.arctan2(sine, before @ after)
-        rotation = rotation_from_vector(axis * (angle / sine))
-        middle = points.mean(axis=0)
-        linear = self.shape @ rotation @ np.linalg.inv(self.shape)
+        linear = self.shape @ _turn(self.inverse, yaw, pitch) @ self.inverse
+        middle = points.sum(axis=0) / len(points)
         result: Array = middle + (points - middle) @ linear.T
         return result
+
+
+@njit(cache=True, nogil=True)
+def _turn(inverse: Array, yaw: float, pitch: float) -> Array:
+    """(3, 3) the turn on the unit sphere, by Rodrigues' formula in sine and cosine."""
+    towards = (np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch))
+    before, after = inverse[:, 2].copy(), np.zeros(3)
+    for axis in range(3):
+        after += inverse[:, axis] * towards[axis]
+    before /= np.sqrt((before**2).sum())
+    after /= np.sqrt((after**2).sum())
+    around, cosine = np.cross(before, after), (before * after).sum()
+    x, y, z = around
+    turn = np.array([[cosine, -z, y], [z, cosine, -x], [-y, x, cosine]])
+    for row in range(3):
+        turn[row] += around[row] * around / max(1 + cosine, 1e-9)
+    return turn
 
 
 def look_angles(generic: GenericHead) -> dict[str, tuple[float, float]]:
@@ -127,65 +140,74 @@ def with_turned_eyes(
 
 
 @dataclass(frozen=True)
+class Motion:
+    """What units and gaze come to, as offsets to be added and eyeballs to be turned.
+
+    Attributes:
+        weights: (U,) by which the offsets of the units are added.
+        angles: (2, 2) rad, yaw and pitch of the left and the right eyeball.
+    """
+
+    weights: Float[Array, " u"]
+    angles: Float[Array, "2 2"]
+
+
+@dataclass(frozen=True)
 class Look:
     """How the eyes of one head look around.
 
     Attributes:
         eyeballs: left and right.
-        units: (8, V, 3) mm: offsets of the eyeLook units, in the order of LOOK_UNITS.
-        angles: (8, 2) yaw and pitch, radians, of the eyeballs at weight 1.
+        units: (8,) which of the head's units are the eyeLook units, in the order of LOOK_UNITS.
+        angles: (8, 2) yaw and pitch, radians, of the eyeballs at weight 1 of these.
     """
 
     eyeballs: tuple[Eyeball, Eyeball]
-    units: Float[Array, "8 v 3"]
+    units: Int[Array, " 8"]
     angles: Float[Array, "8 2"]
 
     @staticmethod
-    def of(
-        generic: GenericHead, vertices: Float[Array, "v 3"], units: Float[Array, "52 v 3"]
-    ) -> Look:
-        """For a head with these neutral vertices and these 52 unit offsets, mm."""
+    def of(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Look:
+        """For a head with these neutral vertices, mm."""
         left, right = (Eyeball.of(generic, vertices, side) for side in SIDES)
         chosen = [generic.unit_names.index(name) for name in LOOK_UNITS]
         angles = look_angles(generic)
         return Look(
             (left, right),
-            frozen(np.asarray(units, np.float64)[chosen]),
+            frozen(np.array(chosen)),
             frozen(np.array([angles[name] for name in LOOK_UNITS])),
         )
 
-    def applied(
-        self, vertices: Float[Array, "v 3"], units: Mapping[str, float], gaze: Gaze
-    ) -> Float[Array, "v 3"]:
-        """(V, 3) mm: the face when it looks there; the same array when it looks straight ahead.
-
-        Args:
-            vertices: (V, 3) mm with all units added as offsets, the eyeLook units too.
-            units: weights of all units by name; those of the eyeLook units turn the eyeballs, and
-                what they added to the eyeballs as offsets is taken back.
-            gaze: radians; adds to what the units say, and takes the lids along.
-        """
-        weights = np.array([units.get(name, 0.0) for name in LOOK_UNITS])
-        follow = self._lid_weights(gaze)
-        if not (weights.any() or follow.any()):
-            return vertices
-        result = check_array("vertices", vertices, self.units.shape[1:]).copy()
-        if follow.any():
-            result += np.tensordot(follow, self.units, axes=1)
-        total = weights + follow
-        for index, eyeball in enumerate(self.eyeballs):
-            mine = np.arange(len(LOOK_UNITS)) % 2 == index
-            ball = eyeball.vertices
-            places = result[ball] - np.tensordot(total[mine], self.units[mine][:, ball], axes=1)
-            yaw, pitch = weights[mine] @ self.angles[mine] + (gaze.yaw, gaze.pitch)
-            result[ball] = eyeball.turned(places, float(yaw), float(pitch))
+    def without_eyeballs(self, units: Float[Array, "52 v 3"]) -> Float[Array, "52 v 3"]:
+        """Unit offsets where the eyeLook units leave to a turn what eyeballs do."""
+        result = np.array(units)
+        for eyeball in self.eyeballs:
+            result[np.ix_(self.units, eyeball.vertices)] = 0
         return result
 
-    def _lid_weights(self, gaze: Gaze) -> Float[Array, " 8"]:
+    def motion(self, units: Float[Array, " u"], gaze: Float[Array, " 2"]) -> Motion:
+        """What the weights of all units and a gaze come to.
+
+        Args:
+            gaze: yaw and pitch, radians; adds to what the units say, and takes the lids along.
+        """
+        asked, weights = units[self.units], units.copy()
+        weights[self.units] += self._lid_weights(gaze)
+        sides = range(len(self.eyeballs))
+        angles = np.array([gaze + asked[side::2] @ self.angles[side::2] for side in sides])
+        return Motion(weights, angles)
+
+    def turn(self, vertices: Float[Array, "v 3"], angles: Float[Array, "2 2"]) -> None:
+        """Turns the eyeballs of a head, (V, 3) mm, in place, by yaw and pitch of either side."""
+        for eyeball, (yaw, pitch) in zip(self.eyeballs, angles.tolist(), strict=True):
+            if yaw or pitch:
+                ball = eyeball.vertices
+                vertices[ball] = eyeball.turned(vertices[ball], yaw, pitch)
+
+    def _lid_weights(self, gaze: Float[Array, " 2"]) -> Float[Array, " 8"]:
         """How far the eyeLook units would turn the eyeballs as the gaze does, lagging beyond 1."""
-        wanted = np.array([gaze.yaw, gaze.pitch])
         size = (self.angles**2).sum(axis=1)
-        shares = np.maximum(self.angles @ wanted / size, 0.0)
+        shares = np.maximum(self.angles @ gaze / size, 0.0)
         lagging: Array = np.minimum(shares, 1.0) + _LAG * np.maximum(shares - 1.0, 0.0)
         return lagging
 

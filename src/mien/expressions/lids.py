@@ -7,12 +7,20 @@ to the outer eye corner, latitude across, and the radius.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int, frozen
 from mien.assets.generic import GenericHead
 from mien.expressions.gaze import SIDES, Eyeball
+from mien.expressions.lid_contact import (
+    along_edge,
+    edge_overlap,
+    move_apart,
+    off_lower,
+    places_of,
+)
 from mien.expressions.margins import behind, distances_from, fading, full_path, skin_edges
 
 _CLEARANCE_MM = 0.4
@@ -20,14 +28,13 @@ _CLEARANCE_MM = 0.4
 _OVERLAP_MM = 0.35
 """How far a closed upper lid reaches over the lower one's edge: no crack between two polygons."""
 _IN_FRONT_MM = 0.15
+"""How far its edge then lies before the lower one's."""
 _REACH_MM = 14.0
 """How far over the closed lid a correction of its edge fades out."""
 _BALL_MM = 18.0
 """Skin further off the eyeball has nothing to do with it."""
 _FIRM_MM = 0.5
 """Lids that would overlap by this much more lie on each other."""
-_ALLOWED = 1e-6
-_ROUNDS = 4
 _STEPS = (0.25, 0.5, 0.75, 1.0)
 
 
@@ -91,12 +98,20 @@ class Lids:
             axes=axes,
         )
 
+    @cached_property
+    def to_sphere(self) -> Float[Array, "3 3"]:
+        """Takes rows from mm, the eyeball's centre as origin, to the unit sphere and its axes."""
+        return frozen(self.eyeball.inverse.T @ self.axes.T)
+
+    @cached_property
+    def from_sphere(self) -> Float[Array, "3 3"]:
+        """The inverse of to_sphere."""
+        return frozen(self.axes @ self.eyeball.shape.T)
+
     def places(self, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
         """(L, 3) longitude and latitude, radians, and radius of the lids on the unit sphere."""
-        points = self.eyeball.on_sphere(vertices[self.vertices]) @ self.axes.T
-        ahead, along, up = points.T
-        flat = np.hypot(ahead, along)
-        return np.column_stack([np.arctan2(along, ahead), np.arctan2(up, flat), np.hypot(flat, up)])
+        places: Array = places_of((vertices[self.vertices] - self.eyeball.centre) @ self.to_sphere)
+        return places
 
     def at(self, places: Float[Array, "l 3"]) -> Float[Array, "l 3"]:
         """(L, 3) mm: the inverse of places."""
@@ -108,35 +123,34 @@ class Lids:
                 np.sin(latitude),
             ]
         )
-        inside = (radius[:, None] * points) @ self.axes
-        result: Array = inside @ self.eyeball.shape.T + self.eyeball.centre
+        result: Array = (radius[:, None] * points) @ self.from_sphere + self.eyeball.centre
         return result
 
     def overlap(self, places: Float[Array, "l 3"]) -> Float[Array, " u"]:
         """(U,) radians by which the upper edge's vertices lie below the lower edge."""
-        upper, lower = self.edges(places)
-        found: Array = np.interp(upper[:, 0], _rising(lower[:, 0]), lower[:, 1]) - upper[:, 1]
+        found: Array = edge_overlap(*self.edges(places))
         return found
 
     def edges(self, places: Float[Array, "l 3"]) -> tuple[Array, Array]:
         """The upper and the lower edge's places, from the inner to the outer corner."""
         return places[: self.upper], places[self.upper : self.upper + self.lower]
 
-    @property
+    @cached_property
     def full_overlap(self) -> Float[Array, " u"]:
         """(U,) radians: that of closed lids; none at the corners, where both are one."""
         shape = np.sin(np.linspace(0, np.pi, self.upper)) ** 0.5
-        wanted: Array = _OVERLAP_MM / self.eyeball.radius * shape
-        return wanted
+        return frozen(_OVERLAP_MM / self.eyeball.radius * shape)
+
+    @cached_property
+    def in_front(self) -> Float[Array, " u"]:
+        """(U,) by how much more radius closed upper lids lie before the lower ones."""
+        return frozen(self.full_overlap * (_IN_FRONT_MM / _OVERLAP_MM))
 
     def spread(
         self, places: Float[Array, "l 3"], corrections: Float[Array, " u"]
     ) -> Float[Array, " l"]:
         """(L,) what corrections along the upper edge are elsewhere on both lids."""
-        upper, _ = self.edges(places)
-        along: Array = np.interp(places[:, 0], _rising(upper[:, 0]), corrections)
-        # Close to a corner the edge doubles back, and its longitude tells no place on it.
-        along[: self.upper] = corrections
+        along: Array = along_edge(places[:, 0], self.upper, corrections)
         return along * self.share
 
 
@@ -172,18 +186,10 @@ def _closing(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
     places[:, 2] = np.maximum(places[:, 2], lids.least)
     down = lids.overlap(places) - lids.full_overlap
     places[:, 1] += lids.spread(places, down) * lids.on_upper
-    places[:, 2] += lids.spread(places, _off_lower(lids, places)) * lids.on_upper
+    off = off_lower(*lids.edges(places), lids.in_front)
+    places[:, 2] += lids.spread(places, off) * lids.on_upper
     moved: Array = lids.at(places) - lids.at(before)
     return moved
-
-
-def _off_lower(lids: Lids, places: Float[Array, "l 3"]) -> Float[Array, " u"]:
-    """(U,) change of radius that lays the upper edge's vertices just before the lower edge."""
-    upper, lower = lids.edges(places)
-    wanted = np.interp(upper[:, 0], _rising(lower[:, 0]), lower[:, 2])
-    wanted += lids.full_overlap * (_IN_FRONT_MM / _OVERLAP_MM)
-    off: Array = wanted - upper[:, 2]
-    return off
 
 
 def _lift(lids: Lids, places: Float[Array, "l 3"]) -> Float[Array, "l 3"]:
@@ -203,36 +209,24 @@ def _axes(corners: Float[Array, "2 3"]) -> Float[Array, "3 3"]:
     return np.array([ahead, along, up * np.sign(up[1])])
 
 
-def _rising(values: Float[Array, " n"]) -> Float[Array, " n"]:
-    """Nowhere falling, as interpolation wants it; edges double back by a hair at the corners."""
-    rising: Array = np.maximum.accumulate(values)
-    return rising
-
-
 def resolve_lids(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"] | None:
     """(L, 3) mm that takes the lids out of each other and out of the eyeball; None: no contact.
 
     The eyeball may have been carried elsewhere; it is taken to be where its vertices are.
     """
-    shift = vertices[lids.eyeball.vertices].mean(axis=0) - lids.eyeball.centre
-    places = lids.places(vertices - shift) if shift.any() else lids.places(vertices)
-    resolved = places.copy()
-    pressed = np.zeros(lids.upper)
-    for _ in range(_ROUNDS):
-        too_far = lids.overlap(resolved) - lids.full_overlap
-        if (too_far < _ALLOWED).all():
-            break
-        # Either lid gives way by half.
-        pressed += np.maximum(too_far, 0.0)
-        back = lids.spread(resolved, np.maximum(too_far, 0.0)) / 2
-        resolved[:, 1] += np.where(lids.on_upper, back, -back)
-    if pressed.any():
-        firmly = np.minimum(pressed * lids.eyeball.radius / _FIRM_MM, 1.0)
-        along = _off_lower(lids, resolved) * firmly
-        resolved[:, 2] += lids.spread(resolved, along) * lids.on_upper
-    inside = resolved[:, 2] < lids.least - _ALLOWED
-    resolved[inside, 2] = lids.least[inside]
-    if np.array_equal(resolved, places):
-        return None
-    moved: Array = lids.at(resolved) - lids.at(places)
-    return moved
+    ball = vertices[lids.eyeball.vertices]
+    points = (vertices[lids.vertices] - ball.sum(axis=0) / len(ball)) @ lids.to_sphere
+    moves = np.zeros_like(points)
+    touching = move_apart(
+        points,
+        lids.upper,
+        lids.lower,
+        lids.share,
+        lids.on_upper,
+        lids.least,
+        lids.full_overlap,
+        lids.in_front,
+        lids.eyeball.radius / _FIRM_MM,
+        moves,
+    )
+    return moves @ lids.from_sphere if touching else None

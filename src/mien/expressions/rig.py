@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from mien.arrays import Array, Float, UInt8
+from mien.arrays import Array, Float, Int, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.errors import InputError
 from mien.expressions.basis import WEIGHT_RANGE, check_weights, outside_hull
 from mien.expressions.contacts import Mechanics
 from mien.expressions.explained import Explanations
 from mien.expressions.followers import part_vertices
+from mien.expressions.gaze import Motion
+from mien.expressions.offsets import add_mixture
 from mien.expressions.regions import AROUND, MASKS, check_masks, default_masks
 from mien.expressions.shading import Openings, brightness_at
 from mien.expressions.state import FACE, FaceState, PosedFace
 from mien.model.head import NEUTRAL, Head
+
+REGIONS = (*MASKS, FACE)
+"""Those that have weights of their own in the end; the face's hold in the rest of the head."""
 
 
 class Rig:
@@ -42,21 +47,21 @@ class Rig:
         self.textures = _textures(head, self.names)
         self.unit_names = head.unit_names
         self._neutral = np.asarray(head.mesh.vertices, np.float64)
-        self._units = np.asarray(head.units, np.float64)
+        units = np.asarray(head.units, np.float64)
         masks = check_masks(head.regions or default_masks(generic), len(self._neutral))
-        self._masks = np.stack([masks[name] for name in MASKS], axis=1)
-        self._rest = 1 - self._masks.sum(axis=1)
+        by_mask = np.stack([masks[name] for name in MASKS], axis=1)
+        self._shares = np.column_stack([by_mask, 1 - by_mask.sum(axis=1)])
         expressions = [head.expressions[name] for name in self.names]
         self._gaze = np.stack([item.gaze for item in expressions])
-        self._mechanics = Mechanics.of(generic, self._neutral, self._units)
+        self._mechanics = Mechanics.of(generic, self._neutral, units)
         self.offsets = np.stack(
             [self._still_eyes(item.vertices) - self._neutral for item in expressions]
         )
         self._explained = Explanations.of(
             np.array([[item.units.get(n, 0.0) for n in self.unit_names] for item in expressions]),
-            self._units,
+            units,
             self.offsets,
-            self._masks,
+            by_mask,
         )
         self._openings = Openings.of(generic, self._neutral)
         self._shading = head.shading
@@ -65,9 +70,9 @@ class Rig:
         self._photographed_light = brightness_at(openings, self._shading)
         self._shaded = _shaded_parts(generic)
         # Where eyes look in a photograph has nothing to do with the units that it shows.
-        self._skin = np.ones(len(self._neutral))
+        self._skin_shares = self._shares.copy()
         for eyeball in self._mechanics.look.eyeballs:
-            self._skin[eyeball.vertices] = 0
+            self._skin_shares[eyeball.vertices] = 0
 
     def evaluate(self, state: FaceState, *, contacts: bool = True) -> PosedFace:
         """The face in this state.
@@ -78,22 +83,42 @@ class Rig:
             contacts: whether lids ride on the eyes and lips do not pass through each other.
         Raises: InputError: an unknown region, expression or unit; weights outside [-0.5, 1.5].
         """
+        gaze = np.array([state.gaze.yaw, state.gaze.pitch])
         by_region = self._region_weights(state.expressions)
-        units = self._unit_weights(state.units)
-        linear = self._neutral + np.tensordot(units, self._units, axes=1)
-        driven = self._explained.driven(units) * np.clip(by_region[:, :1], 0, 1)
-        weights = self._spread(by_region)
-        vertices = linear + np.einsum("vk,kvc->vc", weights, self.offsets)
-        vertices = self._turned_eyes(vertices, weights)
-        if driven.any():
-            along = self._spread(driven) * self._skin[:, None]
-            vertices += self._explained.residuals(along)
-            weights = weights + np.column_stack([-along.sum(axis=1), along])
-        moved = bool(units.any() or state.gaze.yaw or state.gaze.pitch)
+        return self.posed(by_region, self._unit_weights(state.units), gaze, contacts=contacts)
+
+    def posed(
+        self,
+        by_region: Float[Array, "r k"],
+        units: Float[Array, " u"],
+        gaze: Float[Array, " 2"],
+        *,
+        contacts: bool = True,
+    ) -> PosedFace:
+        """What evaluate makes of a state, from its numbers; they are not checked.
+
+        Args:
+            by_region: weights of the expressions in each of REGIONS.
+            units: weights. gaze: yaw and pitch, radians.
+        """
+        weights = self._shares @ by_region
+        moved = bool(units.any() or gaze.any())
         if not moved and _one_expression(by_region):
             vertices = self._photographed[int(by_region[0].argmax())]
-        else:
-            vertices = self._mechanics.applied(vertices, state.units, state.gaze, contacts=contacts)
+            return PosedFace(vertices, weights, self._brightness(vertices, weights))
+        motion = self._mechanics.motion(units, gaze)
+        vertices = self._neutral.copy()
+        self._mechanics.offsets.add(motion.weights, vertices)
+        add_mixture(weights[:, 1:], self.offsets[1:], vertices)
+        self._look_around(vertices, weights, motion)
+        driven = self._explained.driven(units) * np.clip(by_region[:, :1], 0, 1)
+        if driven.any():
+            along = self._skin_shares @ driven
+            add_mixture(along, self._explained.left_over[1:], vertices)
+            weights[:, 1:] += along
+            weights[:, 0] -= along.sum(axis=1)
+        if contacts:
+            vertices = self._mechanics.contacts.resolved(vertices)
         return PosedFace(vertices, weights, self._brightness(vertices, weights))
 
     def mask(self, region: str) -> Float[Array, " v"]:
@@ -103,8 +128,8 @@ class Rig:
         """
         _check_known("region", region, AROUND)
         inside = [region in (name, *AROUND[name]) for name in MASKS]
-        mask: Array = self._masks[:, inside].sum(axis=1)
-        return mask + self._rest if region == FACE else mask
+        mask: Array = self._shares[:, [*inside, region == FACE]].sum(axis=1)
+        return mask
 
     def hull_notes(self, state: FaceState) -> tuple[str, ...]:
         """What a state asks for beyond the expressions that were photographed, by its regions.
@@ -119,16 +144,9 @@ class Rig:
     def _region_weights(
         self, expressions: Mapping[str, Mapping[str, float]]
     ) -> Float[Array, "r k"]:
-        """(R, K) weights in each mask's region, and in the rest of the head last."""
-        for region in expressions:
-            _check_known("region", region, AROUND)
-        rows = []
-        for region in (*MASKS, FACE):
-            names = (region, *AROUND[region])
-            rows.append(
-                self._weights(next((expressions[n] for n in names if n in expressions), {}))
-            )
-        return np.array(rows)
+        """(R, K) weights in each of REGIONS."""
+        own = [self._weights({}), *(self._weights(given) for given in expressions.values())]
+        return np.array(own)[region_rows(tuple(expressions))]
 
     def _weights(self, given: Mapping[str, float]) -> Float[Array, " k"]:
         weights = np.zeros(len(self.names))
@@ -153,11 +171,6 @@ class Rig:
             weights[self.unit_names.index(name)] = weight
         return weights
 
-    def _spread(self, by_region: Float[Array, "r k"]) -> Float[Array, "v k"]:
-        """Regions' weights at the vertices."""
-        spread: Array = self._masks @ by_region[:-1] + self._rest[:, None] * by_region[-1]
-        return spread
-
     def _still_eyes(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
         """The expression with its eyeballs as in neutral: they are turned, not mixed."""
         still = np.array(vertices, np.float64)
@@ -165,15 +178,14 @@ class Rig:
             still[eyeball.vertices] = self._neutral[eyeball.vertices]
         return still
 
-    def _turned_eyes(
-        self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
-    ) -> Float[Array, "v 3"]:
-        for side, eyeball in enumerate(self._mechanics.look.eyeballs):
-            ball = eyeball.vertices
-            yaw, pitch = weights[ball[0]] @ self._gaze[:, side]
-            if yaw or pitch:
-                vertices[ball] = eyeball.turned(vertices[ball], float(yaw), float(pitch))
-        return vertices
+    def _look_around(
+        self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"], motion: Motion
+    ) -> None:
+        """Turns the eyes in place: as in the photographs that are mixed, then by the motion."""
+        look = self._mechanics.look
+        balls = [eyeball.vertices[0] for eyeball in look.eyeballs]
+        look.turn(vertices, np.einsum("sk,ksa->sa", weights[balls], self._gaze))
+        look.turn(vertices, motion.angles)
 
     def _brightness(
         self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
@@ -185,6 +197,19 @@ class Rig:
             there = weights[part[0]] @ self._photographed_light[:, column]
             brightness[part] = now[column] / max(float(there), 0.1)
         return brightness
+
+
+def region_rows(regions: Sequence[str]) -> Int[Array, " r"]:
+    """(R,) which of these regions each of REGIONS obeys, counted from 1; 0 for none.
+
+    Raises: InputError: an unknown region.
+    """
+    for region in regions:
+        _check_known("region", region, AROUND)
+    nearest = (
+        next((name for name in (own, *AROUND[own]) if name in regions), None) for own in REGIONS
+    )
+    return np.array([0 if name is None else 1 + regions.index(name) for name in nearest])
 
 
 def _textures(head: Head, names: Iterable[str]) -> tuple[UInt8[Array, "h w 3"], ...]:

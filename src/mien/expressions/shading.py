@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -64,12 +65,10 @@ def brightness_at(
     openings: Float[Array, "*n 3"], polynomials: Mapping[str, Polynomial]
 ) -> Float[Array, "*n 3"]:
     """Brightness of the left eye, the right eye and the teeth at these openings."""
-    openings = np.asarray(openings, np.float64)
-    result = np.empty_like(openings)
-    for column, part in enumerate((EYES, EYES, TEETH)):
-        opening = np.clip(openings[..., column], 0, MOST_OPEN[part])
-        result[..., column] = np.polynomial.polynomial.polyval(opening, polynomials[part])
-    clipped: Array = np.clip(result, *_RANGE)
+    parts = (EYES, EYES, TEETH)
+    c0, c1, c2 = np.array([polynomials[part] for part in parts]).T
+    o = np.clip(openings, 0, [MOST_OPEN[part] for part in parts])
+    clipped: Array = np.clip(c0 + o * (c1 + o * c2), *_RANGE)
     return clipped
 
 
@@ -96,4 +95,4 @@ def fit_polynomial(part: str, measured: Sequence[tuple[float, float, float]]) ->
 
 
 def _distance(vertices: Float[Array, "v 3"], pair: tuple[int, int]) -> float:
-    return float(np.linalg.norm(vertices[pair[0]] - vertices[pair[1]]))
+    return math.dist(vertices[pair[0]], vertices[pair[1]])

@@ -11,8 +11,9 @@ from mien.arrays import Array, Bool, Float, frozen
 from mien.assets.generic import load_generic_head
 from mien.errors import InputError
 from mien.expressions.basis import WEIGHT_RANGE, Basis
-from mien.expressions.rig import Rig
-from mien.expressions.state import FaceState, Gaze, PosedFace
+from mien.expressions.offsets import SparseOffsets
+from mien.expressions.rig import Rig, region_rows
+from mien.expressions.state import PosedFace
 from mien.mesh import Mesh
 from mien.model.head import Head
 from mien.render.mipmap import build_pyramids
@@ -101,10 +102,13 @@ class TrackedFace:
         self.painted = prepare_painted(mesh, build_pyramids(self.rig.textures))
         self.grey = grey_pyramids(self.painted.pyramids)
         self._masks = np.stack([self.rig.mask(region) for region in regions], axis=1)
-        chosen = [head.unit_names.index(name) for name in units]
-        moves = [*self._expression_moves(), *np.asarray(head.units[chosen], np.float64)]
+        self._rows = region_rows(self.layout.regions)
+        self._neutral_weights = np.eye(1, len(self.rig.names))
+        self._units = [head.unit_names.index(name) for name in units]
+        moves = [*self._expression_moves(), *np.asarray(head.units[self._units], np.float64)]
         moves += _gaze_moves(head.mesh)
         self.moves = frozen(np.stack(moves))
+        self._sparse_moves = SparseOffsets.of(self.moves)
         self.answers = self._answers()
         shares = self._masks[mesh.triangles].mean(axis=1)
         self.region_of = frozen(np.where(shares.max(axis=1) > 0, shares.argmax(axis=1), -1))
@@ -126,21 +130,18 @@ class TrackedFace:
         # What is noise alone must not bring a photographed expression along (expressions.rig).
         sure = np.where(np.abs(parameters.units) > _LEAST_UNIT, parameters.units, 0.0)
         parameters = FaceParameters(parameters.alpha, sure, parameters.gaze)
-        rows = self.weights(parameters)[:, 1:].tolist()
-        expressions = {
-            region: dict(zip(self.layout.expressions[1:], row, strict=True))
-            for region, row in zip(self.layout.regions, rows, strict=True)
-        }
-        units = dict(zip(self.layout.units, parameters.units.tolist(), strict=True))
-        state = FaceState(expressions, units, Gaze(*parameters.gaze.tolist()))
-        return Anchor(parameters, self.rig.evaluate(state))
+        by_region = np.vstack([self._neutral_weights, self.weights(parameters)])[self._rows]
+        units = np.zeros(len(self.rig.unit_names))
+        units[self._units] = parameters.units
+        return Anchor(parameters, self.rig.posed(by_region, units, parameters.gaze))
 
     def posed(self, anchor: Anchor, parameters: FaceParameters) -> PosedFace:
         """The face at other parameters near by: the anchor's and the sum of what they change."""
         step = parameters.vector - anchor.at.vector
         if not step.any():
             return anchor.face
-        vertices = anchor.face.vertices + np.tensordot(step, self.moves, axes=1)
+        vertices = anchor.face.vertices.copy()
+        self._sparse_moves.add(step, vertices)
         turned = (parameters.alpha - anchor.at.alpha) @ self.basis.Q.T
         return PosedFace(
             vertices, anchor.face.weights + self._masks @ turned, anchor.face.brightness
