@@ -37,6 +37,22 @@ def test_pixels_are_sampled_at_their_centres_and_top_left_edges_belong() -> None
     np.testing.assert_array_equal(raster.mask, expected)
 
 
+@pytest.mark.parametrize("size", [3, 12, 60])
+def test_a_triangle_shows_where_all_its_edges_say_so(rng: np.random.Generator, size: int) -> None:
+    """Narrow and wide ones, many with corners at centres and edges along rows and columns."""
+    columns, rows = np.meshgrid(np.arange(64) + 0.5, np.arange(64) + 0.5)
+    on_centres = rng.integers(0, size, (30, 3, 2)) + 0.5
+    for corners in np.concatenate([rng.uniform(0, size, (30, 3, 2)), on_centres]):
+        way = np.sign(np.linalg.det(corners[1:] - corners[0]).round(9))
+        inside = np.full((64, 64), way != 0)
+        for (x0, y0), (x1, y1) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            dx, dy = way * (x1 - x0), way * (y1 - y0)
+            line = dx * (rows - y0) - dy * (columns - x0)
+            inside &= (line >= 0) if dy < 0 or (dy == 0 and dx > 0) else (line > 0)
+        shown = rasterize(corners, np.ones(3), np.array([[0, 1, 2]]), 64, 64).mask
+        np.testing.assert_array_equal(shown, inside)
+
+
 @pytest.mark.parametrize("turn", [[0, 1, 2], [0, 2, 1], [1, 2, 0]])
 def test_barycentrics_are_perspective_correct(turn: list[int]) -> None:
     corners = np.array([[-30.0, -20, 300], [35, -10, 500], [0, 40, 900]])
@@ -77,6 +93,13 @@ def test_corners_far_outside_or_not_finite_do_no_harm() -> None:
     corners = np.array([[-1e12, -1e12], [1e12, -1e12], [0, 1e12], [np.nan, 3]])
     raster = rasterize(corners, np.ones(4), np.array([[0, 1, 2], [0, 1, 3]]), 8, 8)
     assert (raster.triangle_ids == 0).all()
+    shapes = np.array(
+        [[[-1, -1], [1, -1], [0, 1]], [[0, 1], [1, 2], [3, 1]], [[5, 0], [0, 5], [9, 9]]]
+    )
+    for far in (1e30, 1e155, 1e300):
+        for corners in far * shapes:
+            ids = rasterize(corners, np.ones(3), np.array([[0, 1, 2]]), 8, 8).triangle_ids
+            assert set(np.unique(ids)) <= {-1, 0}
 
 
 def test_same_bytes_whatever_the_number_of_threads(rng: np.random.Generator) -> None:

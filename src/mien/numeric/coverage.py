@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from mien.arrays import Array, Float, Int
-from mien.numeric.raster import clip_columns, edge_line
+from mien.numeric.raster import edge_line
 
 STRIP = 36
 """Rows of samples in a strip, whole pixels of 1, 2 or 3 rows; at full HD it fits into a cache."""
@@ -184,14 +184,40 @@ def _is_hidden(coverage: Coverage, t: int, origin: int, farthest: Array) -> bool
 
 
 @njit(inline="always")
+def _clip_columns(
+    a: float, x0: float, rest: float, least: float, shift: float, left: int, right: int
+) -> tuple[int, int]:
+    """Of the columns from left to right, the first and the last inside an edge.
+
+    Args:
+        least: of the values inside (edge_line).
+        shift: rest / a; the edge crosses the row at x0 - shift.
+    """
+    if a == 0.0:
+        return (left, right) if rest >= least else (left, left - 1)
+    crossing = min(max(x0 - shift - 0.5, left - 1.0), right + 1.0)
+    nearest = np.rint(crossing)
+    if abs(crossing - nearest) > 1e-6:
+        if a > 0.0:
+            return max(left, int(np.ceil(crossing))), right
+        return left, min(right, int(np.floor(crossing)))
+    # Rounding can put the crossing on the wrong side of a centre, so that centre is tested.
+    centre = int(nearest)
+    inside = a * (centre + 0.5 - x0) + rest >= least
+    if a > 0.0:
+        return max(left, centre if inside else centre + 1), right
+    return left, min(right, centre if inside else centre - 1)
+
+
+@njit(inline="always")
 def _cover(coverage: Coverage, t: int, origin: int, ids: Array, nearest: Array) -> None:
     points, triangles, planes = coverage.points, coverage.triangles, coverage.planes
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     if _is_front(planes, t):
         j, k = k, j
-    a0, b0, x0, y0, closed0 = edge_line(points, j, k)
-    a1, b1, x1, y1, closed1 = edge_line(points, k, i)
-    a2, b2, x2, y2, closed2 = edge_line(points, i, j)
+    a0, b0, x0, y0, least0 = edge_line(points, j, k)
+    a1, b1, x1, y1, least1 = edge_line(points, k, i)
+    a2, b2, x2, y2, least2 = edge_line(points, i, j)
     # Where an edge crosses a row's centres: the column moves by this much a row.
     slope0, slope1, slope2 = b0 / a0, b1 / a1, b2 / a2
     w0 = planes[t, W0]
@@ -203,9 +229,9 @@ def _cover(coverage: Coverage, t: int, origin: int, ids: Array, nearest: Array) 
     top, bottom = max(coverage.boxes[t, 0], origin), min(coverage.boxes[t, 1], origin + STRIP - 1)
     for row in range(top, bottom + 1):
         y = row + 0.5
-        left, right = clip_columns(a0, x0, b0 * (y - y0), closed0, slope0 * (y - y0), first, last)
-        left, right = clip_columns(a1, x1, b1 * (y - y1), closed1, slope1 * (y - y1), left, right)
-        left, right = clip_columns(a2, x2, b2 * (y - y2), closed2, slope2 * (y - y2), left, right)
+        left, right = _clip_columns(a0, x0, b0 * (y - y0), least0, slope0 * (y - y0), first, last)
+        left, right = _clip_columns(a1, x1, b1 * (y - y1), least1, slope1 * (y - y1), left, right)
+        left, right = _clip_columns(a2, x2, b2 * (y - y2), least2, slope2 * (y - y2), left, right)
         # 1/z is linear on the screen.
         start = np.float32(w0 + across * (left + 0.5 - planes[t, X]) + down * (y - planes[t, Y]))
         line = row - origin

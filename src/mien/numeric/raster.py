@@ -16,6 +16,10 @@ from mien.arrays import Array, Float, Int, check_array, check_positive, frozen
 from mien.errors import InputError
 from mien.numeric.threads import for_row_bands
 
+_ABOVE_ZERO = float(np.nextafter(0.0, 1.0))
+_WIDE = 5
+"""Columns in a triangle's box, from which on it is worth telling first which are inside."""
+
 
 @dataclass(frozen=True)
 class Raster:
@@ -62,17 +66,22 @@ def rasterize(
     vertices_px = check_array("vertices_px", vertices_px, (None, 2), finite=False)
     depth = check_array("depth", depth, (len(vertices_px),), finite=False)
     triangles = check_triangles(triangles, len(vertices_px))
-    # The kernel fills these two, in its threads: touching fresh memory is most of the cost.
-    ids = np.empty((height, width), np.int32)
-    nearest = np.empty((height, width), np.float32)
-    barycentrics = np.zeros((height, width, 3), np.float32)
+    raster = unfilled(width, height)
     inputs = [frozen(np.ascontiguousarray(array)) for array in (vertices_px, depth, triangles)]
+    outputs = (raster.triangle_ids, raster.barycentrics, raster.depth)
 
     def rows(first: int, end: int) -> None:
-        _rasterize_rows(*inputs, cull, first, end, ids, barycentrics, nearest)
+        rasterize_rows(*inputs, cull, first, end, *outputs)
 
     for_row_bands(rows, height, work=4 * len(triangles) + width * height)
-    return Raster(ids, barycentrics, nearest)
+    return raster
+
+
+def unfilled(width: int, height: int) -> Raster:
+    """Memory that rasterize_rows is the first to touch: that takes long, but it runs in threads."""
+    shape = (height, width)
+    ids, depth = np.empty(shape, np.int32), np.empty(shape, np.float32)
+    return Raster(ids, np.empty((*shape, 3), np.float32), depth)
 
 
 def interpolate(
@@ -104,49 +113,30 @@ def check_triangles(triangles: object, vertices: int) -> Int[Array, "f 3"]:
 
 
 @njit(inline="always")
-def edge_line(vertices_px: Array, i: int, j: int) -> tuple[float, float, float, float, bool]:
-    """The line i-j as a (x - x0) + b (y - y0), positive inside; whether a point on it is inside.
+def edge_line(vertices_px: Array, i: int, j: int) -> tuple[float, float, float, float, float]:
+    """The line i-j as a (x - x0) + b (y - y0), and the least value of that inside.
 
     Inside is to the right when walking from i to j with y pointing down. Both triangles at an
-    edge compute the same numbers with opposite signs, and zero at either end.
+    edge compute the same numbers with opposite signs, and zero at either end; zero is inside one.
     """
     low, high = min(i, j), max(i, j)
     x0, y0 = vertices_px[low, 0], vertices_px[low, 1]
     dx, dy = vertices_px[high, 0] - x0, vertices_px[high, 1] - y0
     sign = 1.0 if i < j else -1.0
     a, b = -sign * dy, sign * dx
-    return a, b, x0, y0, a > 0.0 or (a == 0.0 and b > 0.0)
+    return a, b, x0, y0, 0.0 if a > 0.0 or (a == 0.0 and b > 0.0) else _ABOVE_ZERO
 
 
 @njit(inline="always")
-def _inside(a: float, x0: float, rest: float, closed: bool, col: int) -> bool:
-    e = a * (col + 0.5 - x0) + rest
-    return e > 0.0 or (closed and e == 0.0)
+def _bounds(a: float) -> tuple[float, float, float]:
+    """1 / a, and what leads from an edge's crossing of a row to the first and last column inside.
 
-
-@njit(inline="always")
-def clip_columns(
-    a: float, x0: float, rest: float, closed: bool, shift: float, left: int, right: int
-) -> tuple[int, int]:
-    """Of the columns from left to right, the first and the last inside an edge.
-
-    Args:
-        shift: rest / a; the edge crosses the row at x0 - shift.
+    Rounding makes them miss none, though they may hold one too many. An edge along the rows bounds
+    no columns.
     """
-    if a == 0.0:
-        return (left, right) if _inside(a, x0, rest, closed, left) else (left, left - 1)
-    crossing = min(max(x0 - shift - 0.5, left - 1.0), right + 1.0)
-    nearest = np.rint(crossing)
-    if abs(crossing - nearest) > 1e-6:
-        if a > 0.0:
-            return max(left, int(np.ceil(crossing))), right
-        return left, min(right, int(np.floor(crossing)))
-    # Rounding can put the crossing on the wrong side of a centre, so that centre is tested.
-    centre = int(nearest)
-    inside = _inside(a, x0, rest, closed, centre)
-    if a > 0.0:
-        return max(left, centre if inside else centre + 1), right
-    return left, min(right, centre if inside else centre - 1)
+    if abs(a) < 1e-12:
+        return 0.0, -np.inf, np.inf
+    return 1.0 / a, (-1e-6 if a > 0.0 else -np.inf), (1e-6 if a < 0.0 else np.inf)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -169,20 +159,31 @@ def _fill_triangle(
     """
     second, third = (2, 1) if flip else (1, 2)
     i, j, k = triangles[t, 0], triangles[t, second], triangles[t, third]
-    a0, b0, x0, y0, closed0 = edge_line(vertices_px, j, k)
-    a1, b1, x1, y1, closed1 = edge_line(vertices_px, k, i)
-    a2, b2, x2, y2, closed2 = edge_line(vertices_px, i, j)
+    a0, b0, x0, y0, least0 = edge_line(vertices_px, j, k)
+    a1, b1, x1, y1, least1 = edge_line(vertices_px, k, i)
+    a2, b2, x2, y2, least2 = edge_line(vertices_px, i, j)
     wi, wj, wk = 1.0 / depth[i], 1.0 / depth[j], 1.0 / depth[k]
-    top, bottom, box_left, box_right = box
+    top, bottom, left, right = box
+    wide = right - left + 1 >= _WIDE
+    if wide:
+        s0, before0, after0 = _bounds(a0)
+        s1, before1, after1 = _bounds(a1)
+        s2, before2, after2 = _bounds(a2)
     for row in range(top, bottom + 1):
         y = row + 0.5
         r0, r1, r2 = b0 * (y - y0), b1 * (y - y1), b2 * (y - y2)
-        left, right = clip_columns(a0, x0, r0, closed0, r0 / a0, box_left, box_right)
-        left, right = clip_columns(a1, x1, r1, closed1, r1 / a1, left, right)
-        left, right = clip_columns(a2, x2, r2, closed2, r2 / a2, left, right)
-        for col in range(left, right + 1):
+        low, high = float(left), float(right)
+        if wide:
+            c0, c1, c2 = x0 - r0 * s0 - 0.5, x1 - r1 * s1 - 0.5, x2 - r2 * s2 - 0.5
+            # The box comes first, for then NaN, of numbers that are too large, changes nothing.
+            low = min(max(low, c0 + before0, c1 + before1, c2 + before2), right + 1.0)
+            high = max(min(high, c0 + after0, c1 + after1, c2 + after2), left - 1.0)
+        for col in range(int(np.ceil(low)), int(np.floor(high)) + 1):
             x = col + 0.5
             e0, e1, e2 = a0 * (x - x0) + r0, a1 * (x - x1) + r1, a2 * (x - x2) + r2
+            # One branch: those that are hard to foretell cost more than the tests.
+            if not ((e0 >= least0) & (e1 >= least1) & (e2 >= least2)):
+                continue
             # 1/z is linear on the screen.
             p0, p1, p2 = e0 * wi, e1 * wj, e2 * wk
             inverse = 1.0 / (p0 + p1 + p2)
@@ -196,7 +197,7 @@ def _fill_triangle(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _rasterize_rows(
+def rasterize_rows(
     vertices_px: Array,
     depth: Array,
     triangles: Array,
@@ -207,27 +208,27 @@ def _rasterize_rows(
     barycentrics: Array,
     nearest: Array,
 ) -> None:
-    """Write every triangle into rows first to end - 1."""
+    """Fill in rows first to end - 1 of what a Raster consists of; see rasterize."""
     ids[first:end] = -1
+    barycentrics[first:end] = 0.0
     nearest[first:end] = np.inf
     for t in range(triangles.shape[0]):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        za, zb, zc = depth[i], depth[j], depth[k]
-        if not (za > 0.0 and zb > 0.0 and zc > 0.0 and za + zb + zc < np.inf):
-            continue
         ax, ay = vertices_px[i, 0], vertices_px[i, 1]
         bx, by = vertices_px[j, 0], vertices_px[j, 1]
         cx, cy = vertices_px[k, 0], vertices_px[k, 1]
+        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
         # Pixels whose centre lies in the bounding box; the comparisons also refuse NaN.
         top = max(np.ceil(min(ay, by, cy) - 0.5), float(first))
         bottom = min(np.floor(max(ay, by, cy) - 0.5), end - 1.0)
         left = max(np.ceil(min(ax, bx, cx) - 0.5), 0.0)
         right = min(np.floor(max(ax, bx, cx) - 0.5), ids.shape[1] - 1.0)
-        if not (top <= bottom and left <= right):
+        shown = (area < 0.0) | ((area > 0.0) & (not cull))
+        if not (shown & (top <= bottom) & (left <= right)):
             continue
-        box = (int(top), int(bottom), int(left), int(right))
-        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-        if area < 0.0 or (area > 0.0 and not cull):
+        za, zb, zc = depth[i], depth[j], depth[k]
+        if za > 0.0 and zb > 0.0 and zc > 0.0 and za + zb + zc < np.inf:
+            box = (int(top), int(bottom), int(left), int(right))
             _fill_triangle(
                 vertices_px, depth, triangles, t, area < 0.0, box, ids, barycentrics, nearest
             )
