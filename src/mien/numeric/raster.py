@@ -17,8 +17,6 @@ from mien.errors import InputError
 from mien.numeric.threads import for_row_bands
 
 _ABOVE_ZERO = float(np.nextafter(0.0, 1.0))
-_WIDE = 5
-"""Columns in a triangle's box, from which on it is worth telling first which are inside."""
 
 
 @dataclass(frozen=True)
@@ -164,20 +162,16 @@ def _fill_triangle(
     a2, b2, x2, y2, least2 = edge_line(vertices_px, i, j)
     wi, wj, wk = 1.0 / depth[i], 1.0 / depth[j], 1.0 / depth[k]
     top, bottom, left, right = box
-    wide = right - left + 1 >= _WIDE
-    if wide:
-        s0, before0, after0 = _bounds(a0)
-        s1, before1, after1 = _bounds(a1)
-        s2, before2, after2 = _bounds(a2)
+    s0, before0, after0 = _bounds(a0)
+    s1, before1, after1 = _bounds(a1)
+    s2, before2, after2 = _bounds(a2)
     for row in range(top, bottom + 1):
         y = row + 0.5
         r0, r1, r2 = b0 * (y - y0), b1 * (y - y1), b2 * (y - y2)
-        low, high = float(left), float(right)
-        if wide:
-            c0, c1, c2 = x0 - r0 * s0 - 0.5, x1 - r1 * s1 - 0.5, x2 - r2 * s2 - 0.5
-            # The box comes first, for then NaN, of numbers that are too large, changes nothing.
-            low = min(max(low, c0 + before0, c1 + before1, c2 + before2), right + 1.0)
-            high = max(min(high, c0 + after0, c1 + after1, c2 + after2), left - 1.0)
+        c0, c1, c2 = x0 - r0 * s0 - 0.5, x1 - r1 * s1 - 0.5, x2 - r2 * s2 - 0.5
+        # The box comes first, for then NaN, of numbers that are too large, changes nothing.
+        low = min(max(float(left), c0 + before0, c1 + before1, c2 + before2), right + 1.0)
+        high = max(min(float(right), c0 + after0, c1 + after1, c2 + after2), left - 1.0)
         for col in range(int(np.ceil(low)), int(np.floor(high)) + 1):
             x = col + 0.5
             e0, e1, e2 = a0 * (x - x0) + r0, a1 * (x - x1) + r1, a2 * (x - x2) + r2
@@ -224,7 +218,7 @@ def rasterize_rows(
         left = max(np.ceil(min(ax, bx, cx) - 0.5), 0.0)
         right = min(np.floor(max(ax, bx, cx) - 0.5), ids.shape[1] - 1.0)
         shown = (area < 0.0) | ((area > 0.0) & (not cull))
-        if not (shown & (top <= bottom) & (left <= right)):
+        if not (shown and top <= bottom and left <= right):
             continue
         za, zb, zc = depth[i], depth[j], depth[k]
         if za > 0.0 and zb > 0.0 and zc > 0.0 and za + zb + zc < np.inf:
