@@ -40,3 +40,11 @@ def test_a_posed_face_stays_as_it_is() -> None:
 def test_arrays_that_do_not_fit(name: str, arrays: tuple[np.ndarray, ...]) -> None:
     with pytest.raises(InputError, match=name):
         PosedFace(*arrays)
+
+
+def test_numbers_need_not_be_looked_at() -> None:
+    unknown = np.full((4, 3), np.nan)
+    face = PosedFace(unknown, np.ones((4, 1)), np.ones(4), finite=False)
+    assert np.isnan(face.vertices).all()
+    with pytest.raises(InputError, match="weights"):
+        PosedFace(unknown, np.ones((3, 1)), np.ones(4), finite=False)

@@ -57,6 +57,12 @@ def test_at_its_anchor_it_is_the_rigs_own_face(model: TrackedFace) -> None:
     np.testing.assert_allclose(found.brightness, own.brightness, atol=1e-12)
 
 
+def test_parameters_must_be_finite(model: TrackedFace) -> None:
+    anchor = model.anchored(MIXED)
+    with pytest.raises(InputError, match="parameters: expected finite numbers"):
+        model.posed(anchor, stepped(MIXED, 3, np.nan))
+
+
 @pytest.mark.parametrize("unknown", range(6))
 def test_expressions_move_as_in_the_rig(model: TrackedFace, unknown: int) -> None:
     """The rig differs where lids ride on the eyes and lips touch: there alone."""

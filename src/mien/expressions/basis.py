@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -112,8 +113,12 @@ class Basis:
         """
         weights = np.asarray(weights, dtype=np.float64)
         _check_last_axis("weights", weights, len(self.Q))
-        alpha: Array = (weights - self.w_star) @ np.linalg.pinv(self.Q).T
+        alpha: Array = (weights - self.w_star) @ self._inverse.T
         return alpha
+
+    @cached_property
+    def _inverse(self) -> Float[Array, "k m"]:
+        return np.linalg.pinv(self.Q)
 
 
 def check_weights(

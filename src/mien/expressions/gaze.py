@@ -45,7 +45,7 @@ class Eyeball:
         reach = np.linalg.norm((vertices[ball] - centre) @ np.linalg.inv(linear).T, axis=1).max()
         return Eyeball(frozen(ball), frozen(centre), frozen(linear * reach))
 
-    @property
+    @cached_property
     def radius(self) -> float:
         """mm: that of the sphere of the same volume."""
         return float(np.abs(np.linalg.det(self.shape)) ** (1 / 3))
@@ -69,10 +69,16 @@ class Eyeball:
         """
         if yaw == 0 and pitch == 0:
             return points
-        linear = self.shape @ _turn(self.inverse, yaw, pitch) @ self.inverse
-        middle = points.sum(axis=0) / len(points)
-        result: Array = middle + (points - middle) @ linear.T
+        result: Array = _turned(points, self.shape, self.inverse, yaw, pitch)
         return result
+
+
+@njit(cache=True, nogil=True)
+def _turned(points: Array, shape: Array, inverse: Array, yaw: float, pitch: float) -> Array:
+    linear = shape @ _turn(inverse, yaw, pitch) @ inverse
+    middle = points.sum(axis=0) / len(points)
+    turned: Array = middle + (points - middle) @ linear.T
+    return turned
 
 
 @njit(cache=True, nogil=True)

@@ -204,6 +204,8 @@ def _ways_out(
     points = places[lip.tested[among]]
     depth, triangle, weights = _into(points, other, others)
     deep = np.flatnonzero(depth - lip.allowed[among] > _TOLERANCE_MM)
+    if not len(deep):
+        return ways
     corners = others[other.triangles[triangle[deep]]]
     nearest = (weights[deep][..., None] * corners).sum(axis=1)
     rise = lip.upwards * (nearest - points[deep])[:, 1] / depth[deep]

@@ -16,7 +16,7 @@ class SparseOffsets:
 
     Attributes:
         starts: (U + 1,) where each one's entries begin, and where the last one's end.
-        vertices: (N,) that an entry moves. moves: (N, 3) mm at weight 1.
+        vertices: (N,) unsigned, that an entry moves. moves: (N, 3) mm at weight 1.
     """
 
     starts: Int[Array, " u+1"]
@@ -29,7 +29,8 @@ class SparseOffsets:
         way, vertices = np.nonzero(np.any(offsets, axis=2))
         starts = np.searchsorted(way, np.arange(len(offsets) + 1))
         moves = np.asarray(offsets[way, vertices], np.float64)
-        return cls(frozen(starts), frozen(vertices), frozen(moves))
+        # Indices that may be negative would be looked at one by one.
+        return cls(frozen(starts), frozen(vertices.astype(np.uint32)), frozen(moves))
 
     def add(self, weights: Float[Array, " u"], vertices: Float[Array, "v 3"]) -> None:
         """Moves vertices, (V, 3) mm, in place, each way by its weight."""

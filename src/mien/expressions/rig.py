@@ -113,10 +113,9 @@ class Rig:
         self._look_around(vertices, weights, motion)
         driven = self._explained.driven(units) * np.clip(by_region[:, :1], 0, 1)
         if driven.any():
-            along = self._skin_shares @ driven
-            add_mixture(along, self._explained.left_over[1:], vertices)
-            weights[:, 1:] += along
-            weights[:, 0] -= along.sum(axis=1)
+            along = self._skin_shares @ np.column_stack([-driven.sum(axis=1), driven])
+            add_mixture(along[:, 1:], self._explained.left_over[1:], vertices)
+            weights += along
         if contacts:
             vertices = self._mechanics.contacts.resolved(vertices)
         return PosedFace(vertices, weights, self._brightness(vertices, weights))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 
 from mien.arrays import Array, Float, check_array, frozen
 
@@ -53,15 +53,20 @@ class PosedFace:
         weights: (V, K) one for each of the rig's textures, summing to 1 at every vertex; from -0.5
             to 1.5, for a face may go past what was photographed.
         brightness: (V,) factor on the colours: eyes and teeth in the shadow of lids and lips.
+
+    Args:
+        finite: look for NaN and infinity; not needed for what follows from finite numbers.
+    Raises: InputError: shape, not finite.
     """
 
     vertices: Float[Array, "v 3"]
     weights: Float[Array, "v k"]
     brightness: Float[Array, " v"]
+    finite: InitVar[bool] = True
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, finite: bool) -> None:
         count = len(self.vertices)
-        for name, shape in (("vertices", (count, 3)), ("brightness", (count,))):
-            object.__setattr__(self, name, frozen(check_array(name, getattr(self, name), shape)))
-        weights = check_array("weights", self.weights, (count, None))
-        object.__setattr__(self, "weights", frozen(weights))
+        shapes = {"vertices": (count, 3), "weights": (count, None), "brightness": (count,)}
+        for name, shape in shapes.items():
+            array = check_array(name, getattr(self, name), shape, finite=finite)
+            object.__setattr__(self, name, frozen(array))

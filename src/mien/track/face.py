@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from mien.arrays import Array, Bool, Float, frozen
+from mien.arrays import Array, Bool, Float, check_array, frozen
 from mien.assets.generic import load_generic_head
 from mien.errors import InputError
 from mien.expressions.basis import WEIGHT_RANGE, Basis
@@ -48,10 +49,10 @@ class FaceParameters:
     units: Float[Array, " u"]
     gaze: Float[Array, " 2"]
 
-    @property
+    @cached_property
     def vector(self) -> Float[Array, " p"]:
         """(P,) all of them, in this order."""
-        return np.concatenate([self.alpha.ravel(), self.units, self.gaze])
+        return frozen(np.concatenate([self.alpha.ravel(), self.units, self.gaze]))
 
     def moved(self, step: Float[Array, " p"]) -> FaceParameters:
         """After a step in all of them."""
@@ -113,7 +114,7 @@ class TrackedFace:
         shares = self._masks[mesh.triangles].mean(axis=1)
         self.region_of = frozen(np.where(shares.max(axis=1) > 0, shares.argmax(axis=1), -1))
 
-    @property
+    @cached_property
     def neutral(self) -> FaceParameters:
         """Neutral in every region, eyes straight ahead."""
         weights = np.eye(len(self.layout.expressions))[np.zeros(len(self.layout.regions), int)]
@@ -136,16 +137,18 @@ class TrackedFace:
         return Anchor(parameters, self.rig.posed(by_region, units, parameters.gaze))
 
     def posed(self, anchor: Anchor, parameters: FaceParameters) -> PosedFace:
-        """The face at other parameters near by: the anchor's and the sum of what they change."""
-        step = parameters.vector - anchor.at.vector
+        """The face at other parameters near by: the anchor's and the sum of what they change.
+
+        Raises: InputError: not finite.
+        """
+        step = check_array("parameters", parameters.vector, (None,)) - anchor.at.vector
         if not step.any():
             return anchor.face
         vertices = anchor.face.vertices.copy()
         self._sparse_moves.add(step, vertices)
-        turned = (parameters.alpha - anchor.at.alpha) @ self.basis.Q.T
-        return PosedFace(
-            vertices, anchor.face.weights + self._masks @ turned, anchor.face.brightness
-        )
+        weights = self._masks @ ((parameters.alpha - anchor.at.alpha) @ self.basis.Q.T)
+        weights += anchor.face.weights
+        return PosedFace(vertices, weights, anchor.face.brightness, finite=False)
 
     def _expression_moves(self) -> list[Float[Array, "v 3"]]:
         """P02 app. B.2: dm/dalpha = sum over k of Q(k, l) m_k, in each region by its mask."""
