@@ -71,7 +71,7 @@ def rasterize(
     def rows(first: int, end: int) -> None:
         rasterize_rows(*inputs, cull, first, end, *outputs)
 
-    for_row_bands(rows, height, work=4 * len(triangles) + width * height)
+    for_row_bands(rows, height, work=2 * len(triangles) + width * height)
     return raster
 
 

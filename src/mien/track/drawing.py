@@ -8,14 +8,17 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mien.arrays import Array, Bool, Float, Int
+from mien.arrays import Array, Bool, Float, Int, frozen
 from mien.expressions.state import PosedFace
-from mien.numeric.raster import Raster, rasterize
+from mien.numeric.raster import Raster, rasterize_rows, unfilled
 from mien.numeric.threads import for_row_bands
 from mien.render.mipmap import Four, Pyramids, level_of_detail, place_lookup, weighted_texels
 from mien.render.mix import Painted
 from mien.track.grey import GreyPyramids, add_greys
 from mien.track.views import View
+
+_Corners = tuple[int, int, int]
+_Shares = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -69,141 +72,210 @@ def draw(
         grey: of the painted textures.
         layers: keep every expression's rendering; otherwise there are 0 of them.
     """
-    places, ids, raster, shades = _placed(painted, face, pose, view)
-    height, width = ids.shape
+    scene = _placed(painted, compared, face, pose, view)
+    ids, barycentrics = scene.raster.triangle_ids, scene.raster.barycentrics
     count = face.weights.shape[1] if layers else 0
-    out, luma = np.zeros((height, width, count), np.float32), np.zeros((height, width), np.float32)
-    mask = np.empty((height, width), np.float32)
-    surface = (compared, painted.triangles, painted.uvs, grey, shades)
+    out, luma = np.empty((*ids.shape, count), np.float32), np.empty(ids.shape, np.float32)
+    mask = np.empty(ids.shape, np.float32)
 
     def rows(first: int, end: int) -> None:
-        _shade_rows(ids, raster.barycentrics, *surface, first, end, mask, out, luma)
+        scene.cover(first, end)
+        _shade_rows(ids, barycentrics, scene.surface, grey, first, end, mask, out, luma)
 
-    for_row_bands(rows, height, work=2 * width * height)
-    return Drawing(ids, raster.barycentrics, raster.depth, places, mask, out, luma)
+    for_row_bands(rows, len(ids), work=scene.work)
+    return Drawing(ids, barycentrics, scene.raster.depth, scene.places, mask, out, luma)
 
 
 def draw_colours(
     painted: Painted, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, view: View
 ) -> tuple[Float[Array, "h w 3"], Float[Array, "h w"]]:
     """The mixture in colour, 0 to 255, and where it is one of the compared triangles."""
-    _, ids, raster, shades = _placed(painted, face, pose, view)
-    height, width = ids.shape
-    out, mask = np.zeros((height, width, 3), np.float32), np.empty((height, width), np.float32)
-    surface = (compared, painted.triangles, painted.uvs, painted.pyramids, shades)
-    _colour_rows(ids, raster.barycentrics, *surface, mask, out)
+    scene = _placed(painted, compared, face, pose, view)
+    ids, barycentrics = scene.raster.triangle_ids, scene.raster.barycentrics
+    out, mask = np.empty((*ids.shape, 3), np.float32), np.empty(ids.shape, np.float32)
+
+    def rows(first: int, end: int) -> None:
+        scene.cover(first, end)
+        _colour_rows(ids, barycentrics, scene.surface, painted.pyramids, first, end, mask, out)
+
+    for_row_bands(rows, len(ids), work=scene.work)
     return out, mask
 
 
+class _Surface(NamedTuple):
+    """What triangles look like.
+
+    Attributes:
+        compared: (F,) bool. triangles: (F, 3). uvs: (F, 3, 2) of every triangle's corners.
+        shades: (V, 2 + K) float32 level of detail, brightness, weight of every texture.
+    """
+
+    compared: Bool[Array, " f"]
+    triangles: Int[Array, "f 3"]
+    uvs: Float[Array, "f 3 2"]
+    shades: Float[Array, "v s"]
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """A face in front of a camera.
+
+    Attributes:
+        surface: of its triangles.
+        places: (V, 3) mm, camera space. points: (V, 2) px. depth: (V,) mm.
+        raster: what covers the pixels, where `cover` has been.
+    """
+
+    surface: _Surface
+    places: Float[Array, "v 3"]
+    points: Float[Array, "v 2"]
+    depth: Float[Array, " v"]
+    raster: Raster
+
+    @property
+    def work(self) -> int:
+        """About how many pixels it costs to cover and shade all rows (numeric.threads)."""
+        return 2 * len(self.surface.triangles) + 3 * self.raster.triangle_ids.size
+
+    def cover(self, first: int, end: int) -> None:
+        """Fill in rows of the raster."""
+        mesh, raster = (self.points, self.depth, self.surface.triangles), self.raster
+        outputs = (raster.triangle_ids, raster.barycentrics, raster.depth)
+        rasterize_rows(*mesh, True, first, end, *outputs)
+
+
 def _placed(
-    painted: Painted, face: PosedFace, pose: Pose, view: View
-) -> tuple[Float[Array, "v 3"], Int[Array, "h w"], Raster, Float[Array, "v s"]]:
-    """Vertices in camera space, what covers the pixels, and detail, brightness and weights."""
-    width, height = view.size
-    focal = view.focal * pose.zoom
-    places = face.vertices @ pose.R.T + pose.t
-    points = focal * places[:, :2] / places[:, 2:] + (view.cx, view.cy)
-    raster = rasterize(points, places[:, 2], painted.triangles, width, height, cull=True)
-    shades = np.empty((len(points), 2 + face.weights.shape[1]), np.float32)
+    painted: Painted, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, view: View
+) -> _Placed:
+    """The face in front of the view's camera, no pixel covered yet."""
+    count, textures = face.weights.shape
+    places, points, depth = np.empty((count, 3)), np.empty((count, 2)), np.empty(count)
+    motion = np.empty((3, 4))
+    motion[:, :3], motion[:, 3] = pose.R, pose.t
+    lens = (float(view.focal * pose.zoom), float(view.cx), float(view.cy))
+    _project(face.vertices, motion, lens, places, points, depth)
+    shades = np.empty((count, 2 + textures), np.float32)
     # As sharp as a picture of four samples a pixel (render.mix).
     shades[:, 0] = level_of_detail(painted.texels, points, painted.triangles) - 0.5
     shades[:, 1], shades[:, 2:] = face.brightness, face.weights
-    return places, raster.triangle_ids, raster, shades
+    surface = _Surface(compared, painted.triangles, painted.uvs, shades)
+    return _Placed(surface, places, frozen(points), frozen(depth), unfilled(*view.size))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _project(
+    vertices: Array,
+    motion: Array,
+    lens: tuple[float, float, float],
+    places: Array,
+    points: Array,
+    depth: Array,
+) -> None:
+    """Fill in vertices in camera space and where they are seen.
+
+    Args:
+        motion: (3, 4) from head to camera space. lens: focal length and principal point, px.
+    """
+    focal, cx, cy = lens
+    for v in range(len(vertices)):
+        x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
+        for axis in range(3):
+            m = motion[axis]
+            places[v, axis] = m[0] * x + m[1] * y + m[2] * z + m[3]
+        depth[v] = places[v, 2]
+        points[v, 0] = focal * places[v, 0] / depth[v] + cx
+        points[v, 1] = focal * places[v, 1] / depth[v] + cy
+
+
+@njit(inline="always")
+def _between(shades: Array, corners: _Corners, b: _Shares, column: int) -> float:
+    """One of the shades at a place in a triangle."""
+    i, j, k = corners
+    value: float = b[0] * shades[i, column] + b[1] * shades[j, column] + b[2] * shades[k, column]
+    return value
 
 
 @njit(inline="always")
 def _lookup(
+    surface: _Surface,
     t: int,
-    b: tuple[float, float, float],
-    triangles: Array,
-    uvs: Array,
+    corners: _Corners,
+    b: _Shares,
     pyramids: Pyramids | GreyPyramids,
-    shades: Array,
     dropped: int,
 ) -> tuple[Four, Four, float]:
     """Texels and their weights for a place in a triangle, and its brightness."""
-    i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+    uvs, shades = surface.uvs, surface.shades
     u = b[0] * uvs[t, 0, 0] + b[1] * uvs[t, 1, 0] + b[2] * uvs[t, 2, 0]
     v = b[0] * uvs[t, 0, 1] + b[1] * uvs[t, 1, 1] + b[2] * uvs[t, 2, 1]
-    level = b[0] * shades[i, 0] + b[1] * shades[j, 0] + b[2] * shades[k, 0]
-    bright = b[0] * shades[i, 1] + b[1] * shades[j, 1] + b[2] * shades[k, 1]
+    level = _between(shades, corners, b, 0)
     fine, coarse = place_lookup(pyramids, u, v, level - dropped)
-    return fine, coarse, bright
+    return fine, coarse, _between(shades, corners, b, 1)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
 def _shade_rows(
     ids: Array,
     barycentrics: Array,
-    compared: Array,
-    triangles: Array,
-    uvs: Array,
+    surface: _Surface,
     grey: GreyPyramids,
-    shades: Array,
     first: int,
     end: int,
     mask: Array,
-    out: Array,
+    layers: Array,
     luma: Array,
 ) -> None:
     """Fill in mask, layers and luma; ids that are not compared become -1."""
-    dropped = grey.dropped
     greys = np.empty(grey.texels.shape[1], np.float32)
+    mask[first:end] = 0.0
+    layers[first:end] = 0.0
+    luma[first:end] = 0.0
     for row in range(first, end):
         for col in range(ids.shape[1]):
             t = ids[row, col]
-            if t < 0 or not compared[t]:
+            if t < 0 or not surface.compared[t]:
                 ids[row, col] = -1
-                mask[row, col] = 0.0
                 continue
-            mask[row, col] = 1.0
-            b0 = barycentrics[row, col, 0]
-            b1 = barycentrics[row, col, 1]
-            b2 = barycentrics[row, col, 2]
-            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            b = (b0, b1, b2)
-            fine, coarse, bright = _lookup(t, b, triangles, uvs, grey, shades, dropped)
+            b = barycentrics[row, col, 0], barycentrics[row, col, 1], barycentrics[row, col, 2]
+            corners = surface.triangles[t, 0], surface.triangles[t, 1], surface.triangles[t, 2]
+            fine, coarse, bright = _lookup(surface, t, corners, b, grey, grey.dropped)
             add_greys(grey.texels, fine, coarse, greys)
             total = np.float32(0.0)
             for n in range(len(greys)):
-                c = 2 + n
-                weight = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]
-                total += weight * greys[n]
-            for n in range(out.shape[2]):
-                out[row, col, n] = bright * greys[n]
+                total += _between(surface.shades, corners, b, 2 + n) * greys[n]
+            for n in range(layers.shape[2]):
+                layers[row, col, n] = bright * greys[n]
             luma[row, col] = bright * total
+            mask[row, col] = 1.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
 def _colour_rows(
     ids: Array,
     barycentrics: Array,
-    compared: Array,
-    triangles: Array,
-    uvs: Array,
+    surface: _Surface,
     pyramids: Pyramids,
-    shades: Array,
+    first: int,
+    end: int,
     mask: Array,
     out: Array,
 ) -> None:
-    for row in range(len(ids)):
+    """Fill in mask and mixture."""
+    mask[first:end] = 0.0
+    out[first:end] = 0.0
+    for row in range(first, end):
         for col in range(ids.shape[1]):
             t = ids[row, col]
-            mask[row, col] = 0.0
-            if t < 0 or not compared[t]:
+            if t < 0 or not surface.compared[t]:
                 continue
-            mask[row, col] = 1.0
-            b0 = barycentrics[row, col, 0]
-            b1 = barycentrics[row, col, 1]
-            b2 = barycentrics[row, col, 2]
-            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            b = (b0, b1, b2)
-            fine, coarse, bright = _lookup(t, b, triangles, uvs, pyramids, shades, 0)
-            for n in range(shades.shape[1] - 2):
-                c = 2 + n
-                weight = b0 * shades[i, c] + b1 * shades[j, c] + b2 * shades[k, c]
+            b = barycentrics[row, col, 0], barycentrics[row, col, 1], barycentrics[row, col, 2]
+            corners = surface.triangles[t, 0], surface.triangles[t, 1], surface.triangles[t, 2]
+            fine, coarse, bright = _lookup(surface, t, corners, b, pyramids, 0)
+            for n in range(len(pyramids.texels)):
+                weight = bright * _between(surface.shades, corners, b, 2 + n)
                 if weight != 0.0:
                     red, green, blue = weighted_texels(pyramids.texels, n, fine, coarse)
-                    out[row, col, 0] += bright * weight * red
-                    out[row, col, 1] += bright * weight * green
-                    out[row, col, 2] += bright * weight * blue
+                    out[row, col, 0] += weight * red
+                    out[row, col, 1] += weight * green
+                    out[row, col, 2] += weight * blue
+            mask[row, col] = 1.0

@@ -58,4 +58,5 @@ def add_greys(texels: Array, fine: Four, coarse: Four, greys: Array) -> None:
     for corner in range(4):
         near, far = scale * np.float32(fine[4 + corner]), scale * np.float32(coarse[4 + corner])
         for n in range(len(greys)):
-            greys[n] += near * texels[fine[corner], n] + far * texels[coarse[corner], n]
+            greys[n] += near * np.float32(texels[fine[corner], n])
+            greys[n] += far * np.float32(texels[coarse[corner], n])
