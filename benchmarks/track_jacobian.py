@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,11 +20,13 @@ from mien.formats.head_folder import load_head
 from mien.numeric.rotation import angle_between
 from mien.track.colours import Colours
 from mien.track.differences import by_differences, unknowns_named
-from mien.track.drawing import Drawing, Pose
+from mien.track.drawing import Pose
 from mien.track.equations import Equations
 from mien.track.face import FaceParameters, TrackedFace
 from mien.track.flows import POSE_UNKNOWNS
-from mien.track.phases import Belief, Guess, Linearize, Scene, by_bands, solve
+from mien.track.guess import Belief, Guess
+from mien.track.looks import Linearize, Look, Pictures, Scene, by_bands
+from mien.track.phases import solve
 from mien.track.views import View, cut_views
 
 FACE_PX, LEVELS, SCALE = 150.0, 3, 40.0
@@ -59,16 +61,34 @@ class Case:
 
 @dataclass
 class Counted:
-    """Linearizations, counted and timed."""
+    """Linearizations, counted and timed: every guess is drawn anew."""
 
     way: Linearize
     seconds: list[float] = field(default_factory=list)
 
-    def __call__(self, scene: Scene, guess: Guess) -> tuple[Equations, Drawing]:
+    def __call__(self, scene: Scene, guess: Guess) -> Look:
+        return _Timed(scene, guess, self)
+
+
+@dataclass(frozen=True)
+class _Timed:
+    """A Look whose equations are always those of a drawing of their own."""
+
+    scene: Scene
+    guess: Guess
+    counted: Counted
+
+    def equations(self, guess: Guess) -> Equations:
         begun = time.perf_counter()
-        found = self.way(scene, guess)
-        self.seconds.append(time.perf_counter() - begun)
+        found = self.counted.way(self.scene, guess).equations(guess)
+        self.counted.seconds.append(time.perf_counter() - begun)
         return found
+
+    def pictures(self, guess: Guess) -> Pictures:
+        return self.scene.pictures(guess)
+
+    def again(self, guess: Guess) -> Look:
+        return replace(self, guess=guess)
 
 
 def cases(model: TrackedFace, shown: Performance, rng: np.random.Generator) -> Iterator[Case]:
@@ -118,13 +138,7 @@ def _errors(
     belief = Belief(case.start, deviations)
     for scene in case.scenes:
         guess = solve(
-            scene,
-            guess,
-            belief,
-            linearized=way,
-            free=free,
-            iterations=iterations,
-            tolerance=tolerance,
+            way(scene, guess), belief, free=free, iterations=iterations, tolerance=tolerance
         ).guess
     turned = np.degrees(angle_between(guess.pose.R, truth.pose.R))
     off = 100 * np.linalg.norm(guess.pose.t - truth.pose.t) / truth.pose.t[2]

@@ -17,7 +17,8 @@ from mien.numeric.rotation import rotation_from_vector
 from mien.render.morph import MorphRenderer
 from mien.track.drawing import Pose
 from mien.track.face import FaceParameters, TrackedFace
-from mien.track.phases import Guess, Scene
+from mien.track.guess import Guess
+from mien.track.looks import Scene
 from mien.track.views import View, cut_views
 from posable import GENERIC, REST, UNITS, head_of, shapes
 

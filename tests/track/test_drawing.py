@@ -11,7 +11,7 @@ import patterned
 from mien.arrays import Array
 from mien.track.drawing import Drawing, draw, draw_colours
 from mien.track.grey import LUMA
-from mien.track.phases import Guess
+from mien.track.guess import Guess
 from mien.track.views import View
 
 MIXED = patterned.doing({"mouth": (0.6, 0.2), "eyes": (0.0, 0.7), "forehead": (-0.2, 1.1)})

@@ -13,9 +13,10 @@ import patterned
 from mien.arrays import Array
 from mien.track.differences import by_differences
 from mien.track.drawing import Drawing
-from mien.track.equations import Comparison, Equations, pose_equations
-from mien.track.flows import POSE_UNKNOWNS, screen_flows
-from mien.track.phases import Guess, Scene, by_bands, by_plain_pictures
+from mien.track.equations import Equations
+from mien.track.flows import POSE_UNKNOWNS, screen_flows, vertex_flows
+from mien.track.guess import Guess
+from mien.track.looks import Scene, by_bands, by_plain_pictures
 
 FACE = patterned.doing(
     {"mouth": (0.4, 0.1), "eyes": (0.0, 0.5), "forehead": (0.2, 0.3)}, units=(0.2, 0.1)
@@ -54,8 +55,8 @@ def whole(drawing: Drawing) -> Array:
 
 
 def both(scene: Scene, *, plain: bool, exact: bool = False) -> tuple[Equations, Equations]:
-    analytic, _ = by_differences(NONE, plain=plain, exact=exact)(scene, GUESS)
-    numeric, _ = by_differences(ALL, plain=plain, exact=exact)(scene, GUESS)
+    ways = (by_differences(which, plain=plain, exact=exact) for which in (NONE, ALL))
+    analytic, numeric = (way(scene, GUESS).equations(GUESS) for way in ways)
     return analytic, numeric
 
 
@@ -94,17 +95,17 @@ def test_blinks(scene: Scene) -> None:
 
 
 def test_of_the_pose_alone_as_with_the_face(scene: Scene) -> None:
-    """The same seven columns by depth and by barycentrics."""
-    alone, _ = by_plain_pictures(scene, GUESS)
-    together, _ = by_differences(NONE, plain=True)(scene, GUESS)
+    """The same seven columns."""
+    alone = by_plain_pictures(scene, GUESS).equations(GUESS)
+    together = by_differences(NONE, plain=True)(scene, GUESS).equations(GUESS)
     assert_alike(alone, together, np.arange(POSE_UNKNOWNS), 1e-3)
     assert not alone.matrix[POSE_UNKNOWNS:].any()
     assert not alone.vector[POSE_UNKNOWNS:].any()
 
 
 def test_bands_are_the_analytic_way(scene: Scene) -> None:
-    usual, _ = by_bands(scene, GUESS)
-    same, _ = by_differences(NONE)(scene, GUESS)
+    usual = by_bands(scene, GUESS).equations(GUESS)
+    same = by_differences(NONE)(scene, GUESS).equations(GUESS)
     np.testing.assert_allclose(usual.matrix, same.matrix, rtol=1e-4, atol=1e-4 * usual.matrix.max())
     np.testing.assert_allclose(usual.vector, same.vector, rtol=1e-4, atol=1e-3)
 
@@ -118,7 +119,8 @@ def test_downhill_leads_back(scene: Scene, unknown: int) -> None:
     ways = {by_bands: 0.3} | ({by_plain_pictures: 0.05} if unknown < POSE_UNKNOWNS else {})
     for linearized, tolerance in ways.items():
         for moved in (step, -step):
-            found, _ = linearized(scene, GUESS.moved(moved))
+            start = GUESS.moved(moved)
+            found = linearized(scene, start).equations(start)
             back = found.vector[unknown] / found.matrix[unknown, unknown]
             assert back == pytest.approx(-moved[unknown], rel=tolerance)
 
@@ -129,6 +131,7 @@ def test_flows_are_those_of_the_projection(rng: np.random.Generator) -> None:
     scene = patterned.scene(GUESS)
     drawing = scene.draw(GUESS, layers=False)
     flows = screen_flows(model.moves, drawing.places, GUESS.pose, scene.view)
+    flows = vertex_flows(flows, drawing.places)
     chosen = rng.integers(0, len(drawing.places), 50)
 
     def projected(guess: Guess) -> Array:
@@ -145,12 +148,10 @@ def test_flows_are_those_of_the_projection(rng: np.random.Generator) -> None:
 def test_robust_weights() -> None:
     """Geman and McClure's: a pixel that is off by the scale counts a quarter."""
     scene = patterned.scene(GUESS)
-    drawing = scene.draw(GUESS, layers=False)
-    off = np.float32(drawing.luma + 20)
+    scene = replace(scene, target=scene.target + np.float32(20))
 
     def sums(scale: float) -> Equations:
-        comparison = Comparison(drawing.luma, off, drawing.mask, scale)
-        return pose_equations(drawing, comparison, GUESS.pose, scene.view)
+        return by_plain_pictures(replace(scene, scale=scale), GUESS).equations(GUESS)
 
     all_count, quarter = sums(1e6), sums(20.0)
     assert quarter.weight == all_count.weight
@@ -166,7 +167,7 @@ def test_any_number_of_threads_gives_the_same_bits(scene: Scene, linearized) -> 
     usual = numba.get_num_threads()
     for threads in (1, min(2, usual)):
         numba.set_num_threads(threads)
-        found.append(linearized(scene, GUESS)[0])
+        found.append(linearized(scene, GUESS).equations(GUESS))
     numba.set_num_threads(usual)
     np.testing.assert_array_equal(found[0].matrix, found[1].matrix)
     np.testing.assert_array_equal(found[0].vector, found[1].vector)

@@ -14,7 +14,7 @@ from mien.track.colours import Colours
 from mien.track.drawing import Pose
 from mien.track.fit import FitOptions, Fitted, FrameFit
 from mien.track.flows import POSE_UNKNOWNS
-from mien.track.phases import Belief, Guess
+from mien.track.guess import Belief, Guess
 
 WEIGHTS = {"mouth": (0.6, 0.1), "eyes": (0.1, 0.4), "forehead": (0.2, 0.5)}
 TRUTH = Guess(patterned.pose(), patterned.doing(WEIGHTS))

@@ -6,7 +6,7 @@ import numpy as np
 
 import patterned
 from mien.track.face import FaceParameters
-from mien.track.phases import Guess
+from mien.track.guess import Guess
 from mien.track.restart import better_start
 
 NEUTRAL = patterned.model().neutral
@@ -23,13 +23,13 @@ def expression(region: str, name: str) -> FaceParameters:
 
 def test_no_other_start_where_all_is_explained() -> None:
     scene = patterned.scene(START)
-    assert better_start(scene, START, scene.draw(START, layers=False)) is None
+    assert better_start(scene, START, scene.pictures(START)) is None
 
 
 def test_a_mouth_that_jumped_is_found_by_itself() -> None:
     true = Guess(START.pose, expression("mouth", "anger"))
     scene = patterned.scene(true)
-    found = better_start(scene, START, scene.draw(START, layers=False))
+    found = better_start(scene, START, scene.pictures(START))
     assert found is not None
     weights = patterned.model().weights(found.face)
     np.testing.assert_allclose(weights[0], [0, 0, 1], atol=1e-9)
@@ -40,6 +40,6 @@ def test_a_mouth_that_jumped_is_found_by_itself() -> None:
 def test_closed_lids_are_found() -> None:
     true = Guess(START.pose, replace(NEUTRAL, units=np.ones(2)))
     scene = patterned.scene(true)
-    found = better_start(scene, START, scene.draw(START, layers=False))
+    found = better_start(scene, START, scene.pictures(START))
     assert found is not None
     assert found.face.units.tolist() == [1, 1]

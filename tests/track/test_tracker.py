@@ -13,7 +13,7 @@ from marked import Blind
 from mien.arrays import Array
 from mien.errors import InputError
 from mien.numeric.rotation import angle_between
-from mien.track.phases import Guess
+from mien.track.guess import Guess
 from mien.track.start import Starter
 from mien.track.state import TrackedFrame, TrackState
 from mien.track.tracker import Tracker, TrackOptions

@@ -27,7 +27,8 @@ def band_pass(
     The mixture is filtered itself, for where weights vary, mixed bands are no bands of a mixture.
 
     Args:
-        mask: (h, w) 0 or 1; the bands are 0 outside. weights: (h, w) of pixels in the means.
+        mask: (h, w) 0 or 1; outside, the bands are 0, but for the target's: that goes on as far as
+            there are means. weights: (h, w) of pixels in the means.
         width: px, odd, side of the square whose mean goes.
     """
     import cv2
@@ -98,8 +99,9 @@ def _subtract_rows(
                 mean = sums[row, col, n] * inverse
                 layer_bands[row, col, n] = keep * layers[row, col, n] - mean
             luma_band[row, col] = keep * luma[row, col] - sums[row, col, count] * inverse
-            mean = sums[row, col, count + 1] * inverse
-            target_band[row, col] = keep * target[row, col] - mean
+            target_band[row, col] = 0.0
+            if share > 1e-6:
+                target_band[row, col] = target[row, col] - sums[row, col, count + 1] / share
 
 
 def odd(width: float) -> int:

@@ -8,18 +8,19 @@ way takes none (docs/tracking.md compares them).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int
 from mien.errors import InputError
-from mien.track.bands import band_pass, odd
 from mien.track.drawing import Drawing
-from mien.track.equations import Answers, Comparison, Equations, band_equations
+from mien.track.equations import Answers, Equations, sum_up
 from mien.track.face import TrackedFace
-from mien.track.flows import POSE_UNKNOWNS, screen_flows
-from mien.track.phases import BAND, Guess, Linearize, Scene
+from mien.track.flows import POSE_UNKNOWNS, screen_flows, vertex_flows
+from mien.track.guess import Guess
+from mien.track.looks import Linearize, Look, Pictures, Scene, banded
+from mien.track.samples import Moved, take_samples
 from mien.track.state import Layout
 
 STEP_PX = 0.5
@@ -47,22 +48,65 @@ def by_differences(
         the filter takes its means over the face, and with the face the target's mean moves too.
     """
 
-    def linearized(scene: Scene, guess: Guess) -> tuple[Equations, Drawing]:
-        scene = _anchored(scene, guess) if exact else scene
-        drawing = scene.draw(guess, layers=True)
-        layers, drawn, target = _pictures(scene, drawing, plain)
-        flows = screen_flows(scene.model.moves, drawing.places, guess.pose, scene.view)
-        steps = _steps(scene.model, flows, step_px)
-        which = np.flatnonzero(numeric)
-        changes = [_change(scene, guess, int(n), steps[n], plain=plain, exact=exact) for n in which]
-        # What changes the picture pixel by pixel is what a layer is: equations.py knows it as such.
-        layers = np.dstack([layers, *changes]) if changes else layers
-        flows[:, which] = 0
-        comparison = Comparison(drawn, target, scene.weights * drawing.mask, scene.scale)
-        answers = _with_layers(scene.model.answers, which)
-        return band_equations(drawing, layers, comparison, flows, answers), drawing
+    def linearized(scene: Scene, guess: Guess) -> Look:
+        return _Redrawn(scene, guess, np.flatnonzero(numeric), plain, exact, step_px)
 
     return linearized
+
+
+@dataclass(frozen=True)
+class _Redrawn:
+    """A Look that draws every guess anew. Its fields are those of by_differences."""
+
+    scene: Scene
+    guess: Guess
+    numeric: Int[Array, " m"]
+    plain: bool
+    exact: bool
+    step_px: float
+
+    def equations(self, guess: Guess) -> Equations:
+        scene = self._around(guess)
+        drawing = scene.draw(guess, layers=True)
+        layers, drawn, target = _pictures(scene, drawing, self.plain)
+        flows = screen_flows(scene.model.moves, drawing.places, guess.pose, scene.view)
+        steps = _steps(scene.model, vertex_flows(flows, drawing.places), self.step_px)
+        changes = [self._change(guess, int(n), steps[n]) for n in self.numeric]
+        # What changes the picture pixel by pixel is what a layer is: equations.py knows it as such.
+        layers = np.dstack([layers, *changes]) if changes else layers
+        flows.counted[self.numeric] = 0
+        answers = _with_layers(scene.model.answers, self.numeric)
+        weights = scene.weights * drawing.mask
+        samples = take_samples(
+            drawing, drawn, target, weights, layers, answers.Q, scale=scene.scale
+        )
+        moved = Moved(drawing.places, flows.lens, np.zeros(len(flows.counted)))
+        return sum_up(samples, moved, flows, answers)
+
+    def pictures(self, guess: Guess) -> Pictures:
+        return self._around(guess).pictures(guess)
+
+    def again(self, guess: Guess) -> Look:
+        return replace(self, guess=guess)
+
+    def _around(self, guess: Guess) -> Scene:
+        if not self.exact:
+            return self.scene
+        return replace(self.scene, anchor=self.scene.model.anchored(guess.face))
+
+    def _change(self, guess: Guess, unknown: int, step: float) -> Float[Array, "h w"]:
+        """How the residual falls with an unknown; 0 where not both steps show the face."""
+        ahead = np.zeros(POSE_UNKNOWNS + len(guess.face.vector))
+        ahead[unknown] = step
+        residuals, shown = [], []
+        for moved in (guess.moved(ahead), guess.moved(-ahead)):
+            seen = self._around(moved)
+            drawing = seen.draw(moved, layers=False)
+            _, drawn, target = _pictures(seen, drawing, self.plain)
+            residuals.append(target - drawn)
+            shown.append(drawing.mask > 0)
+        change = (residuals[1] - residuals[0]) / np.float32(2 * step)
+        return np.where(shown[0] & shown[1], change, np.float32(0))
 
 
 def unknowns_named(layout: Layout, names: Sequence[str]) -> Bool[Array, " n"]:
@@ -79,36 +123,13 @@ def unknowns_named(layout: Layout, names: Sequence[str]) -> Bool[Array, " n"]:
     return np.repeat([name in names for name in counts], list(counts.values()))
 
 
-def _anchored(scene: Scene, guess: Guess) -> Scene:
-    return replace(scene, anchor=scene.model.anchored(guess.face))
-
-
 def _pictures(
     scene: Scene, drawing: Drawing, plain: bool
 ) -> tuple[Float[Array, "h w k"], Float[Array, "h w"], Float[Array, "h w"]]:
     """Layers, their mixture and the target as they are compared."""
     if plain:
         return drawing.layers, drawing.luma, scene.target
-    width = odd(BAND * scene.face_px)
-    shown = (drawing.layers, drawing.luma, scene.target)
-    return band_pass(*shown, drawing.mask, scene.weights, width)
-
-
-def _change(
-    scene: Scene, guess: Guess, unknown: int, step: float, *, plain: bool, exact: bool
-) -> Float[Array, "h w"]:
-    """How the residual falls with an unknown; 0 where not both steps show the face."""
-    ahead = np.zeros(POSE_UNKNOWNS + len(guess.face.vector))
-    ahead[unknown] = step
-    residuals, shown = [], []
-    for moved in (guess.moved(ahead), guess.moved(-ahead)):
-        seen = _anchored(scene, moved) if exact else scene
-        drawing = seen.draw(moved, layers=False)
-        _, drawn, target = _pictures(seen, drawing, plain)
-        residuals.append(target - drawn)
-        shown.append(drawing.mask > 0)
-    change = (residuals[1] - residuals[0]) / np.float32(2 * step)
-    return np.where(shown[0] & shown[1], change, np.float32(0))
+    return banded(scene, drawing)
 
 
 def _steps(model: TrackedFace, flows: Float[Array, "v n 2"], step_px: float) -> Float[Array, " n"]:

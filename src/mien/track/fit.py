@@ -10,19 +10,12 @@ from mien.arrays import Array, Bool, Float, UInt8
 from mien.camera import Camera
 from mien.track.colours import Colours, match_colours
 from mien.track.differences import by_differences, unknowns_named
-from mien.track.drawing import Drawing, Pose, draw_colours
+from mien.track.drawing import Pose, draw_colours
 from mien.track.face import Anchor, TrackedFace
 from mien.track.flows import POSE_UNKNOWNS
-from mien.track.phases import (
-    Answer,
-    Belief,
-    Guess,
-    Linearize,
-    Scene,
-    by_bands,
-    by_plain_pictures,
-    solve,
-)
+from mien.track.guess import Belief, Guess
+from mien.track.looks import Look, Pictures, Scene, by_bands, by_plain_pictures
+from mien.track.phases import Answer, solve
 from mien.track.restart import better_start
 from mien.track.trust import LEAST_SCALE, patch_trust, usual_difference
 from mien.track.views import BRIGHTEST, View, cut_views
@@ -40,17 +33,17 @@ class FitOptions:
     Attributes:
         face_px: extent at which the face is compared; smaller ones stay as they are.
         levels: sizes of the picture, each half of the one before; 2 at least.
-        iterations: at most, in each phase. finest: the same on the finest size, the dearest.
+        iterations: at most, each time that the face is drawn. last: the same for the last time.
         numeric: unknowns whose Jacobian is taken by central differences: "pose", a region, a unit,
             "gaze". All are analytic by default: as good, and a tenth of the time
             (docs/tracking.md).
-        tolerance: relative fall of the cost at which a phase ends; on smaller sizes ten times it.
+        tolerance: relative fall of the cost at which the last ends; the others at ten times it.
     """
 
     face_px: float = 150.0
     levels: int = 3
     iterations: int = 2
-    finest: int = 2
+    last: int = 3
     tolerance: float = 1e-3
     numeric: tuple[str, ...] = ()
 
@@ -89,6 +82,8 @@ class FrameFit:
         unknowns = np.arange(POSE_UNKNOWNS + len(model.neutral.vector))
         self._pose = unknowns < POSE_UNKNOWNS - 1
         self._both = unknowns != POSE_UNKNOWNS - 1
+        # On the smallest size an eye is some six pixels wide, too few to tell where it looks.
+        self._all_but_gaze = self._both & (unknowns < len(unknowns) - 2)
         numeric = unknowns_named(model.layout, options.numeric)
         self._by_bands = by_differences(numeric) if numeric.any() else by_bands
         self._outline = np.unique(model.painted.triangles[model.compared])
@@ -132,21 +127,25 @@ class FrameFit:
         known = known.towards(self._colours(scene, answer.guess), pace)
         for view in views[-2::-1]:
             finest = view is views[0]
-            scene = _next_scene(scene, answer.drawing, view, known, finest=finest)
-            free, start = self._both, answer.guess
-            answer = self._solved(scene, start, belief, self._by_bands, free, finest=finest)
+            scene = _next_scene(scene, answer.pictures, view, known, finest=finest)
+            look = self._by_bands(scene, answer.guess)
+            answer = self._solved(look, belief, self._both)
+        # Drawn once more where it was found: to a tenth of a pixel that makes a difference.
+        look = answer.look.again(answer.guess)
+        answer = self._solved(look, belief, self._both, last=True)
         return _fitted(scene, answer, known)
 
     def _roughly(self, scene: Scene, start: Guess, belief: Belief) -> tuple[Answer, Belief]:
         """On the smallest size; and what is expected after it."""
-        guess = self._solved(scene, start, belief, by_plain_pictures, self._pose).guess
-        answer = self._solved(scene, guess, belief, self._by_bands, self._both)
-        elsewhere = better_start(scene, answer.guess, answer.drawing)
+        guess = self._solved(by_plain_pictures(scene, start), belief, self._pose).guess
+        answer = self._solved(self._by_bands(scene, guess), belief, self._all_but_gaze)
+        elsewhere = better_start(scene, answer.guess, answer.pictures)
         if elsewhere is None:
             return answer, belief
         # What a leap says does not follow from the frame before.
         belief = replace(belief, mean=replace(belief.mean, face=elsewhere.face))
-        return self._solved(scene, elsewhere, belief, self._by_bands, self._both), belief
+        look = self._by_bands(scene, elsewhere)
+        return self._solved(look, belief, self._all_but_gaze), belief
 
     def _views(
         self, pixels: Array, camera: Camera, pose: Pose, anchor: Anchor
@@ -177,40 +176,31 @@ class FrameFit:
         return match_colours(drawn, view.pixels, weights)
 
     def _solved(
-        self,
-        scene: Scene,
-        guess: Guess,
-        belief: Belief,
-        linearized: Linearize,
-        free: Bool[Array, " n"],
-        *,
-        finest: bool = False,
+        self, look: Look, belief: Belief, free: Bool[Array, " n"], *, last: bool = False
     ) -> Answer:
         options = self.options
         return solve(
-            scene,
-            guess,
+            look,
             belief,
-            linearized=linearized,
             free=free,
-            iterations=options.finest if finest else options.iterations,
-            # A start for the next size need not be exact.
-            tolerance=options.tolerance if finest else 10 * options.tolerance,
+            iterations=options.last if last else options.iterations,
+            # A start for the next need not be exact.
+            tolerance=options.tolerance if last else 10 * options.tolerance,
         )
 
 
 def _next_scene(
-    scene: Scene, drawing: Drawing, view: View, colours: Colours, *, finest: bool
+    scene: Scene, seen: Pictures, view: View, colours: Colours, *, finest: bool
 ) -> Scene:
-    """The next size, with what the drawing of this one tells of which pixels to believe.
+    """The next size, with what this one tells of which pixels to believe.
 
     Only on the finest is what is still not explained taken to be something else than the face.
     """
-    weights = scene.view.inside * drawing.mask
-    usual = usual_difference(drawing.luma, scene.target, weights)
+    weights = scene.view.inside * seen.mask
+    usual = usual_difference(seen.drawn, seen.target, weights)
     believed = view.inside
     if finest:
-        trust = patch_trust(drawing.luma, scene.target, weights, face_px=scene.face_px)
+        trust = patch_trust(seen.drawn, seen.target, weights, face_px=scene.face_px)
         believed = believed * _enlarged(trust, view)
     return replace(
         scene,
@@ -230,15 +220,15 @@ def _enlarged(trust: Float[Array, "h w"], view: View) -> Float[Array, "h w"]:
 
 def _fitted(scene: Scene, answer: Answer, colours: Colours) -> Fitted:
     """How well the face explains the frame, over the pixels that count."""
-    drawing = answer.drawing
-    weights = scene.weights * drawing.mask
-    shown = drawing.mask > 0
+    pictures = answer.pictures
+    weights = scene.weights * pictures.mask
+    shown = pictures.mask > 0
     # Too bright to tell is neither covered nor outside of the frame.
     untold = scene.view.pixels[shown & (scene.view.inside < 0.5)]
     bright = np.count_nonzero(untold.max(axis=1) > BRIGHTEST) if len(untold) else 0
     seen = float(weights.sum() / max(np.count_nonzero(shown) - bright, 1))
     chosen = weights > 0.25
-    a, b = drawing.luma[chosen], scene.target[chosen]
+    a, b = pictures.drawn[chosen], pictures.target[chosen]
     found = (answer.guess, answer.deviations, answer.information)
     if len(a) < 2:
         return Fitted(*found, colours, np.inf, seen, 0.0)

@@ -10,16 +10,13 @@ import numpy as np
 
 from mien.arrays import Array, Bool, Float
 from mien.numeric.lm import minimize_lm
-from mien.track.bands import band_pass, odd
-from mien.track.drawing import Drawing, Pose, draw
-from mien.track.equations import Comparison, Equations, band_equations, pose_equations
-from mien.track.face import Anchor, FaceParameters, TrackedFace
-from mien.track.flows import POSE_UNKNOWNS, screen_flows
+from mien.track.equations import Equations
+from mien.track.face import TrackedFace
+from mien.track.flows import POSE_UNKNOWNS
+from mien.track.guess import Belief, Guess
+from mien.track.looks import Look, Pictures
 from mien.track.penalty import range_penalty
-from mien.track.views import View
 
-BAND = 0.2
-"""Width of the widest structures that expressions are told by, over the face's."""
 SAY = 2000.0
 """How many independent observations a face's pixels are, however many: neighbours err alike."""
 LIMIT = 200.0
@@ -31,114 +28,6 @@ _LEAST_NOISE = 0.5
 
 
 @dataclass(frozen=True)
-class Guess:
-    """P02's parameters p: where the head is and what the face does."""
-
-    pose: Pose
-    face: FaceParameters
-
-    def moved(self, step: Float[Array, " n"]) -> Guess:
-        """After a step in all unknowns: R <- R^ R (P02 app. B.2), everything else by addition."""
-        import cv2
-
-        turned = cv2.Rodrigues(np.asarray(step[:3]))[0] @ self.pose.R
-        zoom = self.pose.zoom * float(np.exp(step[6]))
-        pose = Pose(turned, self.pose.t + step[3:6], zoom)
-        return Guess(pose, self.face.moved(step[POSE_UNKNOWNS:]))
-
-    def since(self, other: Guess) -> Float[Array, " n"]:
-        """The step that leads here from another."""
-        import cv2
-
-        # Never near a half turn, where this is less exact than numeric.rotation, and far quicker.
-        turn = cv2.Rodrigues(self.pose.R @ other.pose.R.T)[0].ravel()
-        zoom = np.log(self.pose.zoom / other.pose.zoom)
-        face = self.face.vector - other.face.vector
-        return np.concatenate([turn, self.pose.t - other.pose.t, [zoom], face])
-
-
-@dataclass(frozen=True)
-class Belief:
-    """What is expected before the picture is looked at.
-
-    Attributes:
-        mean: the likeliest.
-        deviations: (N,) standard deviations of a step away from it, each by itself.
-    """
-
-    mean: Guess
-    deviations: Float[Array, " n"]
-
-
-@dataclass(frozen=True)
-class Scene:
-    """One size of a frame, and all that a phase takes as given.
-
-    Attributes:
-        anchor: the face around which the model is linear.
-        target: (h, w) float32 luma of the frame, as the colours of the head's photos would be.
-        weights: (h, w) of the pixels.
-        scale: grey levels by which a pixel may be off and still count.
-        face_px: width of the face in this size.
-    """
-
-    model: TrackedFace
-    anchor: Anchor
-    view: View
-    target: Float[Array, "h w"]
-    weights: Float[Array, "h w"]
-    scale: float
-    face_px: float
-
-    def draw(self, guess: Guess, *, layers: bool) -> Drawing:
-        """The face as guessed; with `layers`, every expression's picture apart."""
-        face = self.model.posed(self.anchor, guess.face)
-        model = self.model
-        return draw(
-            model.painted,
-            model.grey,
-            model.compared,
-            face,
-            guess.pose,
-            self.view,
-            layers=layers,
-        )
-
-
-Linearize = Callable[[Scene, Guess], tuple[Equations, Drawing]]
-
-
-def by_plain_pictures(scene: Scene, guess: Guess) -> tuple[Equations, Drawing]:
-    """Equations of the pose alone, analytic; rows of the face's parameters are 0."""
-    drawing = scene.draw(guess, layers=False)
-    weights = scene.weights * drawing.mask
-    comparison = Comparison(drawing.luma, scene.target, weights, scene.scale)
-    found = pose_equations(drawing, comparison, guess.pose, scene.view)
-    count = POSE_UNKNOWNS + len(guess.face.vector)
-    matrix, vector = np.zeros((count, count)), np.zeros(count)
-    matrix[:POSE_UNKNOWNS, :POSE_UNKNOWNS] = found.matrix
-    vector[:POSE_UNKNOWNS] = found.vector
-    return Equations(matrix, vector, found.squares, found.weight), drawing
-
-
-def by_bands(scene: Scene, guess: Guess) -> tuple[Equations, Drawing]:
-    """Equations of pose and face, analytic, over band-pass filtered pictures."""
-    model = scene.model
-    drawing = scene.draw(guess, layers=True)
-    layers, drawn, target = band_pass(
-        drawing.layers,
-        drawing.luma,
-        scene.target,
-        drawing.mask,
-        scene.weights,
-        odd(BAND * scene.face_px),
-    )
-    comparison = Comparison(drawn, target, scene.weights * drawing.mask, scene.scale)
-    flows = screen_flows(model.moves, drawing.places, guess.pose, scene.view)
-    return band_equations(drawing, layers, comparison, flows, model.answers), drawing
-
-
-@dataclass(frozen=True)
 class Answer:
     """What a phase found.
 
@@ -147,67 +36,90 @@ class Answer:
         deviations: (N,) standard deviations of the unknowns given picture and belief; the belief's
             own for those that were not free.
         information: (M, M) inverse covariance of the free unknowns.
-        drawing: of the guess. iterations: linearizations made.
+        look: at the scene, around the start. iterations: linearizations made.
         rms: grey levels, of the pixels' weighted residual.
     """
 
     guess: Guess
     deviations: Float[Array, " n"]
     information: Float[Array, "m m"]
-    drawing: Drawing
+    look: Look
     iterations: int
     rms: float
 
+    @property
+    def pictures(self) -> Pictures:
+        """Of the guess."""
+        return self.look.pictures(self.guess)
+
 
 def solve(
-    scene: Scene,
-    guess: Guess,
-    belief: Belief,
-    *,
-    linearized: Linearize,
-    free: Bool[Array, " n"],
-    iterations: int,
-    tolerance: float,
+    look: Look, belief: Belief, *, free: Bool[Array, " n"], iterations: int, tolerance: float
 ) -> Answer:
     """The free unknowns of least cost, by P02 eq. (6); damping is in proportion to the diagonal.
 
-    The cost is the squared residual of the pixels, in units of the noise that the guess leaves and
-    counted as SAY observations in all, plus half the squared distance from the belief, plus D(p).
+    The cost is the squared residual of the pixels, in units of the noise that the first guess
+    leaves and counted as SAY observations in all, plus half the squared distance from the belief,
+    plus D(p).
 
     Args:
-        linearized: gives the pixels' equations.
+        look: gives the pixels' equations, and the first guess.
         iterations, tolerance: where to stop (numeric.lm).
     """
-    # The last two only: the loop goes back to the one before when a step fails.
-    seen: dict[int, tuple[Guess, Equations, Drawing, _Prior]] = {}
+    problem = _Problem(look, belief, free)
+    result = minimize_lm(
+        look.guess,
+        cost=problem.cost,
+        linearize=problem.linearize,
+        move=Guess.moved,
+        max_iterations=iterations,
+        tolerance=tolerance,
+        max_failures=1,
+    )
+    found, _ = problem.at(result.x)
+    # Without D(p): that a weight is at the end of its range says nothing of how sure it is.
+    information = problem.scale(found) * found.matrix[np.ix_(free, free)]
+    information += np.diag(belief.deviations[free] ** -2.0)
+    deviations = belief.deviations.copy()
+    deviations[free] = np.sqrt(np.diag(np.linalg.inv(information)))
+    rms = float(np.sqrt(found.squares / max(found.weight, 1e-9)))
+    return Answer(result.x, deviations, information, look, result.iterations, rms)
 
-    def at(x: Guess) -> tuple[Guess, Equations, Drawing, _Prior]:
-        if id(x) not in seen:
-            while len(seen) > 1:
-                del seen[next(iter(seen))]
-            seen[id(x)] = (x, *linearized(scene, x), _prior(scene.model, x, belief))
-        return seen[id(x)]
 
-    first = at(guess)[1]
-    say = min(1.0, SAY / scene.face_px**2)
-    noise = max(first.squares / max(first.weight, 1e-9), _LEAST_NOISE**2)
+class _Problem:
+    """Cost and normal equations as minimize_lm asks for them."""
 
-    def scale(found: Equations) -> float:
-        # Pixels that come and go at the outline must not count as better or worse.
-        return say / noise * first.weight / max(found.weight, 1e-9)
+    def __init__(self, look: Look, belief: Belief, free: Bool[Array, " n"]) -> None:
+        self._look, self._belief, self._free = look, belief, free
+        # The last two only: the loop goes back to the one before when a step fails.
+        self._seen: dict[int, tuple[Guess, Equations, _Prior]] = {}
+        first, _ = self.at(look.guess)
+        noise = max(first.squares / max(first.weight, 1e-9), _LEAST_NOISE**2)
+        self._say = first.weight * min(1.0, SAY / look.scene.face_px**2) / noise
 
-    def cost(x: Guess) -> float:
-        _, found, _, prior = at(x)
-        return scale(found) * found.squares / 2 + prior.value
+    def at(self, x: Guess) -> tuple[Equations, _Prior]:
+        """Equations of the pixels, and what was believed."""
+        if id(x) not in self._seen:
+            while len(self._seen) > 1:
+                del self._seen[next(iter(self._seen))]
+            # With the guess itself, for an id is its own only while it is kept.
+            prior = _prior(self._look.scene.model, x, self._belief)
+            self._seen[id(x)] = (x, self._look.equations(x), prior)
+        return self._seen[id(x)][1:]
 
-    def normal(x: Guess) -> tuple[Array, Array]:
-        _, found, _, prior = at(x)
-        factor = scale(found)
+    def scale(self, found: Equations) -> float:
+        """Of the pixels' equations; those that come and go must not count as better or worse."""
+        return self._say / max(found.weight, 1e-9)
+
+    def cost(self, x: Guess) -> float:
+        found, prior = self.at(x)
+        return self.scale(found) * found.squares / 2 + prior.value
+
+    def linearize(self, x: Guess) -> Callable[[float], tuple[Array, float]]:
+        found, prior = self.at(x)
+        factor, free = self.scale(found), self._free
         matrix = (factor * found.matrix + prior.hessian)[np.ix_(free, free)]
-        return matrix, (factor * found.vector - prior.gradient)[free]
-
-    def linearize(x: Guess) -> Callable[[float], tuple[Array, float]]:
-        matrix, downhill = normal(x)
+        downhill = (factor * found.vector - prior.gradient)[free]
         diagonal = np.diag(matrix)
 
         def step(damping: float) -> tuple[Array, float]:
@@ -217,24 +129,6 @@ def solve(
             return whole, float(found @ (damping * diagonal * found + downhill)) / 2
 
         return step
-
-    result = minimize_lm(
-        guess,
-        cost=cost,
-        linearize=linearize,
-        move=Guess.moved,
-        max_iterations=iterations,
-        tolerance=tolerance,
-        max_failures=1,
-    )
-    _, found, drawing, _ = at(result.x)
-    # Without D(p): that a weight is at the end of its range says nothing of how sure it is.
-    information = scale(found) * found.matrix[np.ix_(free, free)]
-    information += np.diag(belief.deviations[free] ** -2.0)
-    deviations = belief.deviations.copy()
-    deviations[free] = np.sqrt(np.diag(np.linalg.inv(information)))
-    rms = float(np.sqrt(found.squares / max(found.weight, 1e-9)))
-    return Answer(result.x, deviations, information, drawing, result.iterations, rms)
 
 
 class _Prior(NamedTuple):

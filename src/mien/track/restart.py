@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from mien.arrays import Array, Float
-from mien.track.drawing import Drawing
 from mien.track.face import BLINKS, FaceParameters, TrackedFace
-from mien.track.phases import Guess, Scene
+from mien.track.guess import Guess
+from mien.track.looks import Pictures, Scene
 
 _SUSPICIOUS = 12.0
 """Grey levels of RMS difference in a region from which another start is looked for, ..."""
@@ -22,13 +22,13 @@ _ASIDE, _DOWN = 0.4, 0.3
 """Radians: how far eyes look aside, or down, when they do."""
 
 
-def better_start(scene: Scene, guess: Guess, drawing: Drawing) -> Guess | None:
+def better_start(scene: Scene, guess: Guess, seen: Pictures) -> Guess | None:
     """A guess that explains a badly explained region clearly better; None: there is none.
 
     Tried are the photographed expressions, one at a time in the region; in that of the eyes, open
     and shut lids and looks to the sides.
     """
-    sums, counts = _region_sums(scene, drawing)
+    sums, counts = _region_sums(scene, seen)
     errors = sums / np.maximum(counts, 1.0)
     elsewhere = (sums.sum() - sums) / np.maximum(counts.sum() - counts, 1.0)
     found = _with_calm_eyes(scene, guess, errors)
@@ -38,7 +38,7 @@ def better_start(scene: Scene, guess: Guess, drawing: Drawing) -> Guess | None:
         best = errors[region] * _BETTER
         for face in _candidates(scene.model, (found or guess).face, int(region)):
             tried = replace(guess, face=face)
-            sums, counts = _region_sums(scene, scene.draw(tried, layers=False))
+            sums, counts = _region_sums(scene, scene.pictures(tried))
             error = sums[region] / max(counts[region], 1.0)
             if error < best:
                 best, found = error, tried
@@ -51,7 +51,7 @@ def _with_calm_eyes(scene: Scene, guess: Guess, errors: Float[Array, " r"]) -> G
         return None
     eyes = ["eye" in region for region in scene.model.layout.regions]
     calm = replace(guess, face=replace(guess.face, gaze=np.zeros(2)))
-    sums, counts = _region_sums(scene, scene.draw(calm, layers=False))
+    sums, counts = _region_sums(scene, scene.pictures(calm))
     better = (sums / np.maximum(counts, 1.0))[eyes].sum() < errors[eyes].sum()
     return calm if better else None
 
@@ -81,11 +81,11 @@ def _with_eyes(
     return replace(face, units=units, gaze=np.array(gaze))
 
 
-def _region_sums(scene: Scene, drawing: Drawing) -> tuple[Float[Array, " r"], Float[Array, " r"]]:
+def _region_sums(scene: Scene, seen: Pictures) -> tuple[Float[Array, " r"], Float[Array, " r"]]:
     """(R,) sums of squared differences in each region, and how many pixels they are."""
-    weights = scene.weights * drawing.mask
-    squares = weights * (drawing.luma - scene.target) ** 2
-    regions = np.where(drawing.mask > 0, scene.model.region_of[drawing.ids], -1)
+    weights = scene.weights * seen.mask
+    squares = weights * (seen.drawn - seen.target) ** 2
+    regions = np.where(seen.mask > 0, scene.model.region_of[seen.ids], -1)
     inside, count = regions >= 0, len(scene.model.layout.regions)
     return (
         np.bincount(regions[inside], squares[inside], count),

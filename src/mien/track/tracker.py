@@ -17,7 +17,7 @@ from mien.track.drawing import Pose
 from mien.track.face import FaceParameters, TrackedFace
 from mien.track.fit import FitOptions, Fitted, FrameFit
 from mien.track.flows import POSE_UNKNOWNS
-from mien.track.phases import Belief, Guess
+from mien.track.guess import Belief, Guess
 from mien.track.start import Starter
 from mien.track.state import Layout, Status, TrackedFrame, TrackState
 from mien.track.steady import Block, steady_step

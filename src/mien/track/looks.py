@@ -1,0 +1,224 @@
+"""One size of a frame beside the face as guessed: drawn once, then moved to guesses near by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numba import njit
+
+from mien.arrays import Array, Float, Int
+from mien.numeric.threads import for_row_bands
+from mien.track.bands import band_pass, odd
+from mien.track.drawing import Drawing, draw
+from mien.track.equations import Answers, Equations, pose_answers, sum_up
+from mien.track.face import Anchor, TrackedFace
+from mien.track.flows import POSE_UNKNOWNS, Flows, screen_flows
+from mien.track.guess import Guess
+from mien.track.samples import Moved, Samples, look_up, sample_place, take_samples
+from mien.track.views import View
+
+BAND = 0.2
+"""Width of the widest structures that expressions are told by, over the face's."""
+
+
+class Pictures(NamedTuple):
+    """Plain luma of face and frame, where a drawing shows the face.
+
+    Attributes:
+        ids: (h, w) triangles, -1 for none. mask: (h, w) float32, 1 where there is one.
+        drawn, target: (h, w) float32, 0 to 255.
+    """
+
+    ids: Int[Array, "h w"]
+    mask: Float[Array, "h w"]
+    drawn: Float[Array, "h w"]
+    target: Float[Array, "h w"]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One size of a frame, and all that a phase takes as given.
+
+    Attributes:
+        anchor: the face around which the model is linear.
+        target: (h, w) float32 luma of the frame, as the colours of the head's photos would be.
+        weights: (h, w) of the pixels.
+        scale: grey levels by which a pixel may be off and still count.
+        face_px: width of the face in this size.
+    """
+
+    model: TrackedFace
+    anchor: Anchor
+    view: View
+    target: Float[Array, "h w"]
+    weights: Float[Array, "h w"]
+    scale: float
+    face_px: float
+
+    def draw(self, guess: Guess, *, layers: bool) -> Drawing:
+        """The face as guessed; with `layers`, every expression's picture apart."""
+        face = self.model.posed(self.anchor, guess.face)
+        model = self.model
+        return draw(
+            model.painted,
+            model.grey,
+            model.compared,
+            face,
+            guess.pose,
+            self.view,
+            layers=layers,
+        )
+
+    def pictures(self, guess: Guess) -> Pictures:
+        """Face and frame, drawn for this guess."""
+        drawing = self.draw(guess, layers=False)
+        return Pictures(drawing.ids, drawing.mask, drawing.luma, self.target)
+
+
+class Look(Protocol):
+    """A scene around one guess."""
+
+    @property
+    def scene(self) -> Scene:
+        """What is looked at."""
+
+    @property
+    def guess(self) -> Guess:
+        """For which the face was drawn."""
+
+    def equations(self, guess: Guess) -> Equations:
+        """Of all unknowns, at a guess near by."""
+
+    def pictures(self, guess: Guess) -> Pictures:
+        """As the guess has them."""
+
+    def again(self, guess: Guess) -> Look:
+        """The same with the face drawn for another guess near by."""
+
+
+Linearize = Callable[[Scene, Guess], Look]
+
+
+def by_plain_pictures(scene: Scene, guess: Guess) -> Look:
+    """Equations of the pose alone, analytic; rows of the face's parameters are 0."""
+    drawing = scene.draw(guess, layers=False)
+    weights = scene.weights * drawing.mask
+    nothing = np.empty((0, 0), np.float32)
+    drawn = (drawing.luma, scene.target, weights, drawing.layers, nothing)
+    samples = take_samples(drawing, *drawn, scale=scene.scale)
+    answers = pose_answers(scene.model.answers.triangles)
+    return _Sampled(scene, guess, drawing, samples, answers)
+
+
+def by_bands(scene: Scene, guess: Guess) -> Look:
+    """Equations of pose and face, analytic, over band-pass filtered pictures."""
+    drawing = scene.draw(guess, layers=True)
+    layers, drawn, target = banded(scene, drawing)
+    answers = scene.model.answers
+    weights = scene.weights * drawing.mask
+    samples = take_samples(drawing, drawn, target, weights, layers, answers.Q, scale=scene.scale)
+    return _Sampled(scene, guess, drawing, samples, answers)
+
+
+def banded(
+    scene: Scene, drawing: Drawing
+) -> tuple[Float[Array, "h w k"], Float[Array, "h w"], Float[Array, "h w"]]:
+    """Layers, their mixture and the target, band-pass filtered."""
+    shown = (drawing.layers, drawing.luma, scene.target)
+    return band_pass(*shown, drawing.mask, scene.weights, odd(BAND * scene.face_px))
+
+
+@dataclass(frozen=True)
+class _Sampled:
+    """A Look at what was drawn for one guess. The Hessian is that guess's, wherever it is taken."""
+
+    scene: Scene
+    guess: Guess
+    drawing: Drawing
+    samples: Samples
+    answers: Answers
+
+    def equations(self, guess: Guess) -> Equations:
+        if guess is self.guess:
+            return self._first
+        found = sum_up(self.samples, self._moved(guess), self._flows, self.answers, matrix=False)
+        return replace(self._padded(found), matrix=self._first.matrix)
+
+    def again(self, guess: Guess) -> Look:
+        plain = len(self.answers.region) == POSE_UNKNOWNS
+        return by_plain_pictures(self.scene, guess) if plain else by_bands(self.scene, guess)
+
+    @cached_property
+    def _first(self) -> Equations:
+        moved = self._moved(self.guess)
+        return self._padded(sum_up(self.samples, moved, self._flows, self.answers))
+
+    @cached_property
+    def _flows(self) -> Flows:
+        moves = self.scene.model.moves[: len(self.answers.region) - POSE_UNKNOWNS]
+        return screen_flows(moves, self.drawing.places, self.guess.pose, self.scene.view)
+
+    def pictures(self, guess: Guess) -> Pictures:
+        moved, drawing = self._moved(guess), self.drawing
+        model = self.scene.model
+        weights = (guess.face.alpha - self.guess.face.alpha) @ model.basis.Q.T
+        drawn, target = np.zeros((2, *drawing.ids.shape), np.float32)
+        inputs = (drawing, moved, model.answers, weights.astype(np.float32), self.scene.target)
+
+        def rows(first: int, end: int) -> None:
+            _picture_rows(*inputs, first, end, drawn, target)
+
+        for_row_bands(rows, len(drawn), work=2 * drawn.size)
+        return Pictures(drawing.ids, drawing.mask, drawn, target)
+
+    def _moved(self, guess: Guess) -> Moved:
+        view, pose = self.scene.view, guess.pose
+        places = self.drawing.places
+        if guess is not self.guess:
+            vertices = self.scene.model.posed(self.scene.anchor, guess.face).vertices
+            places = vertices @ pose.R.T + pose.t
+        lens = (float(view.focal * pose.zoom), view.cx, view.cy)
+        return Moved(places, lens, guess.since(self.guess))
+
+    def _padded(self, found: Equations) -> Equations:
+        """Of all unknowns, where the answers are of the first few only."""
+        few, count = len(found.vector), POSE_UNKNOWNS + len(self.guess.face.vector)
+        matrix, vector = np.zeros((count, count)), np.zeros(count)
+        matrix[:few, :few], vector[:few] = found.matrix, found.vector
+        return replace(found, matrix=matrix, vector=vector)
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _picture_rows(
+    drawing: Drawing,
+    moved: Moved,
+    answers: Answers,
+    weights: Array,
+    plain: Array,
+    first: int,
+    end: int,
+    drawn: Array,
+    target: Array,
+) -> None:
+    masks, layers = answers.masks, drawing.layers
+    for row in range(first, end):
+        for col in range(drawn.shape[1]):
+            t = drawing.ids[row, col]
+            if t < 0:
+                continue
+            i, j, k = answers.triangles[t, 0], answers.triangles[t, 1], answers.triangles[t, 2]
+            b0 = drawing.barycentrics[row, col, 0]
+            b1 = drawing.barycentrics[row, col, 1]
+            b2 = drawing.barycentrics[row, col, 2]
+            total = drawing.luma[row, col]
+            for r in range(masks.shape[1]):
+                share = b0 * masks[i, r] + b1 * masks[j, r] + b2 * masks[k, r]
+                for n in range(layers.shape[2]):
+                    total += share * weights[r, n] * layers[row, col, n]
+            drawn[row, col] = total
+            x, y = sample_place((i, j, k), (b0, b1, b2), moved.places, moved.lens)
+            target[row, col] = look_up(plain, x, y)
