@@ -63,17 +63,18 @@ def _print_depths(
 ) -> None:
     contacts = mechanics.contacts
     jaw = generic.unit_names.index("jawOpen")
-    for title, depth in (("lids", lid_depth), ("lips", lip_depth)):
-        print(f"\n| {title}, at weight 1 | transferred | corrected | half | live |")
+    for part, depth in (("lids", lid_depth), ("lips", lip_depth)):
+        print(f"\n| {part}, at weight 1 | transferred | corrected | half | live |")
         print("| --- | ---: | ---: | ---: | ---: |")
         for index, name in enumerate(generic.unit_names):
-            weights = {name: 1.0} | ({"jawOpen": 1.0} if name == "mouthClose" else {})
             chosen = [index, jaw] if name == "mouthClose" else [index]
             raw, sound = (neutral + table[chosen].sum(axis=0) for table in (transferred, units))
-            states = [raw, sound, (neutral + sound) / 2, mechanics.applied(sound, weights)]
+            live = mechanics.applied(neutral, np.eye(len(units))[chosen].sum(axis=0))
+            states = [raw, sound, (neutral + sound) / 2, live]
             found = [depth(contacts, state) for state in states]
             if max(found) > _LEAST_MM:
-                print(f"| {' + '.join(weights)} |", " | ".join(f"{d:.2f}" for d in found), "|")
+                title = " + ".join(generic.unit_names[n] for n in chosen)
+                print(f"| {title} |", " | ".join(f"{d:.2f}" for d in found), "|")
 
 
 def _print_closed_eyes(
@@ -86,9 +87,13 @@ def _print_closed_eyes(
     print("| --- | ---: | ---: |")
     for others in ((), ("eyeLookDown",), ("eyeLookUp",), ("eyeSquint", "cheekSquint")):
         names = ("eyeBlink", *others)
-        weights = {f"{name}{side.capitalize()}": 1.0 for name in names for side in SIDES}
-        posed = neutral + sum(units[generic.unit_names.index(name)] for name in weights)
-        states = (posed, mechanics.applied(posed, weights))
+        chosen = [
+            generic.unit_names.index(f"{name}{side.capitalize()}")
+            for name in names
+            for side in SIDES
+        ]
+        live = mechanics.applied(neutral, np.eye(len(units))[chosen].sum(axis=0))
+        states = (neutral + units[chosen].sum(axis=0), live)
         counts = [sum(_eyeball_pixels(generic, state, side) for side in SIDES) for state in states]
         print(f"| {' + '.join(names)} | {counts[0]} | {counts[1]} |")
 

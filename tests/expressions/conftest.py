@@ -41,15 +41,12 @@ class Rigged:
 
     def moved(self, gaze: tuple[float, float] = (0.0, 0.0), **weights: float) -> Array:
         """(V, 3) mm: with turning eyes, contacts unresolved. Gaze is yaw and pitch, radians."""
-        motion = self.mechanics.motion(self.weights(**weights), np.array(gaze))
-        vertices = self.neutral.copy()
-        self.mechanics.offsets.add(motion.weights, vertices)
-        self.mechanics.look.turn(vertices, motion.angles)
-        return vertices
+        units = self.weights(**weights)
+        return self.mechanics.applied(self.neutral, units, np.array(gaze), contacts=False)
 
     def living(self, gaze: tuple[float, float] = (0.0, 0.0), **weights: float) -> Array:
         """(V, 3) mm: with turning eyes and contacts."""
-        return self.mechanics.contacts.resolved(self.moved(gaze, **weights))
+        return self.mechanics.applied(self.neutral, self.weights(**weights), np.array(gaze))
 
 
 def both(name: str, weight: float = 1.0) -> dict[str, float]:

@@ -7,14 +7,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from mien.arrays import Array, Float, check_array
+from mien.arrays import Array, Float, check_array, frozen
 from mien.assets.generic import GenericHead
 from mien.expressions.followers import Followers
-from mien.expressions.gaze import LOOK_UNITS, SIDES, Look, Motion, turn_eyeballs
+from mien.expressions.gaze import LOOK_UNITS, SIDES, Look, turn_eyeballs
 from mien.expressions.lids import Lids, close_lids, resolve_lids
 from mien.expressions.lips import Lips, part_lips, resolve_lips
 from mien.expressions.offsets import SparseOffsets
 from mien.expressions.transfer import transfer_units
+
+_AHEAD = frozen(np.zeros(2))
 
 
 @dataclass(frozen=True)
@@ -91,14 +93,28 @@ class Mechanics:
         jaw, close = (generic.unit_names.index(name) for name in ("jawOpen", "mouthClose"))
         return Mechanics(look, Contacts.of(generic, vertices), offsets, jaw, close)
 
-    def motion(self, units: Float[Array, " u"], gaze: Float[Array, " 2"]) -> Motion:
-        """What the units' weights and a gaze (yaw and pitch, radians) come to.
+    def applied(
+        self,
+        vertices: Float[Array, "v 3"],
+        units: Float[Array, " u"],
+        gaze: Float[Array, " 2"] = _AHEAD,
+        *,
+        contacts: bool = True,
+    ) -> Float[Array, "v 3"]:
+        """(V, 3) mm: the face as its units move it, as it looks and touches.
 
-        Lids go with the gaze, and a mouth closes as far as its jaw is open.
+        Args:
+            vertices: (V, 3) mm, the neutral or any mixed face.
+            units: weights.
+            gaze: yaw and pitch, radians; in addition to what the units say; the lids go along.
+            contacts: off where lids and lips may pass through each other.
         """
-        motion = self.look.motion(units, gaze)
-        motion.weights[self.close] -= max(units[self.close] - max(units[self.jaw], 0.0), 0.0)
-        return motion
+        weights, angles = self.look.motion(units, gaze)
+        weights[self.close] -= max(units[self.close] - max(units[self.jaw], 0.0), 0.0)
+        moved = vertices.copy()
+        self.offsets.add(weights, moved)
+        self.look.turn(moved, angles)
+        return self.contacts.resolved(moved) if contacts else moved
 
 
 def fit_units(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[Array, "52 v 3"]:

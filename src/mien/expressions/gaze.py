@@ -146,19 +146,6 @@ def with_turned_eyes(
 
 
 @dataclass(frozen=True)
-class Motion:
-    """What units and gaze come to, as offsets to be added and eyeballs to be turned.
-
-    Attributes:
-        weights: (U,) by which the offsets of the units are added.
-        angles: (2, 2) rad, yaw and pitch of the left and the right eyeball.
-    """
-
-    weights: Float[Array, " u"]
-    angles: Float[Array, "2 2"]
-
-
-@dataclass(frozen=True)
 class Look:
     """How the eyes of one head look around.
 
@@ -191,17 +178,19 @@ class Look:
             result[np.ix_(self.units, eyeball.vertices)] = 0
         return result
 
-    def motion(self, units: Float[Array, " u"], gaze: Float[Array, " 2"]) -> Motion:
-        """What the weights of all units and a gaze come to.
+    def motion(
+        self, units: Float[Array, " u"], gaze: Float[Array, " 2"]
+    ) -> tuple[Float[Array, " u"], Float[Array, "2 2"]]:
+        """What the weights of all units and a gaze (yaw and pitch, radians) come to.
 
-        Args:
-            gaze: yaw and pitch, radians; adds to what the units say, and takes the lids along.
+        Returns: (U,) the weights of the units' offsets, lids going along with the gaze; (2, 2)
+            rad, yaw and pitch of the left and the right eyeball.
         """
         asked, weights = units[self.units], units.copy()
         weights[self.units] += self._lid_weights(gaze)
         sides = range(len(self.eyeballs))
         angles = np.array([gaze + asked[side::2] @ self.angles[side::2] for side in sides])
-        return Motion(weights, angles)
+        return weights, angles
 
     def turn(self, vertices: Float[Array, "v 3"], angles: Float[Array, "2 2"]) -> None:
         """Turns the eyeballs of a head, (V, 3) mm, in place, by yaw and pitch of either side."""

@@ -14,7 +14,6 @@ from mien.expressions.basis import WEIGHT_RANGE, check_weights, outside_hull
 from mien.expressions.contacts import Mechanics
 from mien.expressions.explained import Explanations
 from mien.expressions.followers import part_vertices
-from mien.expressions.gaze import Motion
 from mien.expressions.offsets import add_mixture
 from mien.expressions.regions import AROUND, MASKS, check_masks, default_masks
 from mien.expressions.shading import Openings, brightness_at
@@ -106,18 +105,15 @@ class Rig:
         if not moved and _one_expression(by_region):
             vertices = self._photographed[int(by_region[0].argmax())]
             return PosedFace(vertices, weights, self._brightness(vertices, weights))
-        motion = self._mechanics.motion(units, gaze)
         vertices = self._neutral.copy()
-        self._mechanics.offsets.add(motion.weights, vertices)
         add_mixture(weights[:, 1:], self.offsets[1:], vertices)
-        self._look_around(vertices, weights, motion)
+        self._look_as_photographed(vertices, weights)
         driven = self._explained.driven(units) * np.clip(by_region[:, :1], 0, 1)
         if driven.any():
             along = self._skin_shares @ np.column_stack([-driven.sum(axis=1), driven])
             add_mixture(along[:, 1:], self._explained.left_over[1:], vertices)
             weights += along
-        if contacts:
-            vertices = self._mechanics.contacts.resolved(vertices)
+        vertices = self._mechanics.applied(vertices, units, gaze, contacts=contacts)
         return PosedFace(vertices, weights, self._brightness(vertices, weights))
 
     def mask(self, region: str) -> Float[Array, " v"]:
@@ -177,14 +173,13 @@ class Rig:
             still[eyeball.vertices] = self._neutral[eyeball.vertices]
         return still
 
-    def _look_around(
-        self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"], motion: Motion
+    def _look_as_photographed(
+        self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
     ) -> None:
-        """Turns the eyes in place: as in the photographs that are mixed, then by the motion."""
+        """Turns the eyes in place by the mean of where they look in the photographs."""
         look = self._mechanics.look
         balls = [eyeball.vertices[0] for eyeball in look.eyeballs]
         look.turn(vertices, np.einsum("sk,ksa->sa", weights[balls], self._gaze))
-        look.turn(vertices, motion.angles)
 
     def _brightness(
         self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
