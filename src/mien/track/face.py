@@ -22,6 +22,7 @@ from mien.render.mix import prepare_painted
 from mien.track.equations import Answers
 from mien.track.flows import POSE_UNKNOWNS
 from mien.track.grey import grey_pyramids
+from mien.track.penalty import Limits
 from mien.track.state import Layout
 
 REGIONS = ("mouth", "eyes", "forehead")
@@ -79,6 +80,7 @@ class TrackedFace:
     Attributes:
         layout: of its numbers.
         basis: between blending weights and parameters, P02 eq. (4).
+        limits: what the parameters are to stay within.
         painted: triangles that can be seen, with their textures; grey: these in grey.
         compared: (F,) bool: those of the face, whose pixels count.
         moves: (P, V, 3) mm by which a step of 1 in each parameter moves each vertex.
@@ -100,6 +102,7 @@ class TrackedFace:
         self.layout = Layout(tuple(regions), self.rig.names, tuple(units))
         self.basis = Basis.by_gram_schmidt(len(self.rig.names))
         mesh, self.compared = _seen(head.mesh, load_generic_head().regions)
+        self.limits = Limits.of(self.basis, len(regions), len(units))
         self.painted = prepare_painted(mesh, build_pyramids(self.rig.textures))
         self.grey = grey_pyramids(self.painted.pyramids)
         self._masks = np.stack([self.rig.mask(region) for region in regions], axis=1)

@@ -6,7 +6,32 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mien.arrays import Array, Float
+from mien.arrays import Array, Float, frozen
+from mien.expressions.basis import Basis
+
+_FARTHEST_GAZE = np.array([0.55, 0.4])
+"""Radians to the sides, and up or down: eyes turn no farther, and lids hide what would tell."""
+
+
+class Limits(NamedTuple):
+    """What of a face is to lie from 0 to 1: directions @ parameters + offset.
+
+    Attributes:
+        directions: (M, P). offset: (M,).
+    """
+
+    directions: Float[Array, "m p"]
+    offset: Float[Array, " m"]
+
+    @classmethod
+    def of(cls, basis: Basis, regions: int, units: int) -> Limits:
+        """Blending weights of all regions, units, and gaze from end to end of its range."""
+        from scipy.linalg import block_diag
+
+        gaze = np.diag(0.5 / _FARTHEST_GAZE)
+        directions = block_diag(*[basis.Q] * regions, np.eye(units), gaze)
+        offset = np.concatenate([*[basis.w_star] * regions, np.zeros(units), [0.5, 0.5]])
+        return cls(frozen(directions), frozen(offset))
 
 
 class Penalty(NamedTuple):

@@ -21,8 +21,6 @@ SAY = 2000.0
 """How many independent observations a face's pixels are, however many: neighbours err alike."""
 LIMIT = 200.0
 """c of P02's D(p), in units of the cost: a weight that is 0.1 out of range costs 2."""
-_FARTHEST_GAZE = np.array([0.55, 0.4])
-"""Radians to the sides, and up or down."""
 _LEAST_NOISE = 0.5
 """Grey levels: nothing is believed to be drawn better than this."""
 
@@ -146,18 +144,11 @@ class _Prior(NamedTuple):
 def _prior(model: TrackedFace, guess: Guess, belief: Belief) -> _Prior:
     away, precision = guess.since(belief.mean), belief.deviations**-2.0
     value, gradient, hessian = float(precision @ away**2) / 2, precision * away, np.diag(precision)
-    Q = model.basis.Q
-    rows = [(row, Q) for row in model.basis.weights(guess.face.alpha)]
-    rows.append((guess.face.units, np.eye(len(guess.face.units))))
-    # Eyes turn no farther, and lids hide what would tell.
-    rows.append((0.5 + guess.face.gaze / 2 / _FARTHEST_GAZE, np.diag(0.5 / _FARTHEST_GAZE)))
-    start = POSE_UNKNOWNS
-    for weights, directions in rows:
-        own = slice(start, start + directions.shape[1])
-        start = own.stop
-        limits = range_penalty(weights, LIMIT, directions)
-        if limits is not None:
-            value += limits.value
-            gradient[own] += limits.gradient
-            hessian[own, own] += limits.hessian
+    limits = model.limits
+    shares = limits.directions @ guess.face.vector + limits.offset
+    penalty = range_penalty(shares, LIMIT, limits.directions)
+    if penalty is not None:
+        value += penalty.value
+        gradient[POSE_UNKNOWNS:] += penalty.gradient
+        hessian[POSE_UNKNOWNS:, POSE_UNKNOWNS:] += penalty.hessian
     return _Prior(value, gradient, hessian)
