@@ -39,6 +39,7 @@ def test_mixture_is_the_sum_of_the_layers_by_their_weights(seen: tuple[Guess, Vi
     np.testing.assert_allclose(found.luma[inside], mixed, atol=0.02)
     np.testing.assert_array_equal(found.mask, inside)
     assert not found.luma[~inside].any()
+    assert not found.layers[~inside].any()
 
 
 def test_layers_are_the_expressions_pictures_on_one_geometry(seen: tuple[Guess, View]) -> None:
