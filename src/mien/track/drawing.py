@@ -153,25 +153,28 @@ def _placed(
     motion = np.empty((3, 4))
     motion[:, :3], motion[:, 3] = pose.R, pose.t
     lens = (float(view.focal * pose.zoom), float(view.cx), float(view.cy))
-    _project(face.vertices, motion, lens, places, points, depth)
     shades = np.empty((count, 2 + textures), np.float32)
+    seen = (face.vertices, face.brightness, face.weights)
+    _place_vertices(*seen, motion, lens, places, points, depth, shades)
     # As sharp as a picture of four samples a pixel (render.mix).
     shades[:, 0] = level_of_detail(painted.texels, points, painted.triangles) - 0.5
-    shades[:, 1], shades[:, 2:] = face.brightness, face.weights
     surface = _Surface(compared, painted.triangles, painted.uvs, shades)
     return _Placed(surface, places, frozen(points), frozen(depth), unfilled(*view.size))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _project(
+def _place_vertices(
     vertices: Array,
+    brightness: Array,
+    weights: Array,
     motion: Array,
     lens: tuple[float, float, float],
     places: Array,
     points: Array,
     depth: Array,
+    shades: Array,
 ) -> None:
-    """Fill in vertices in camera space and where they are seen.
+    """Fill in vertices in camera space, where they are seen, and shades but for their detail.
 
     Args:
         motion: (3, 4) from head to camera space. lens: focal length and principal point, px.
@@ -185,6 +188,9 @@ def _project(
         depth[v] = places[v, 2]
         points[v, 0] = focal * places[v, 0] / depth[v] + cx
         points[v, 1] = focal * places[v, 1] / depth[v] + cy
+        shades[v, 1] = brightness[v]
+        for n in range(weights.shape[1]):
+            shades[v, 2 + n] = weights[v, n]
 
 
 @njit(inline="always")
