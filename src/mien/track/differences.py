@@ -15,12 +15,12 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, Int
 from mien.errors import InputError
 from mien.track.drawing import Drawing
-from mien.track.equations import Answers, Equations, sum_up
+from mien.track.equations import Equations, sum_up
 from mien.track.face import TrackedFace
 from mien.track.flows import POSE_UNKNOWNS, screen_flows, vertex_flows
 from mien.track.guess import Guess
 from mien.track.looks import Linearize, Look, Pictures, Scene, banded
-from mien.track.samples import Moved, take_samples
+from mien.track.samples import Answers, Moved, take_samples
 from mien.track.state import Layout
 
 STEP_PX = 0.5
@@ -77,10 +77,9 @@ class _Redrawn:
         flows.counted[self.numeric] = 0
         answers = _with_layers(scene.model.answers, self.numeric)
         weights = scene.weights * drawing.mask
-        samples = take_samples(
-            drawing, drawn, target, weights, layers, answers.Q, scale=scene.scale
-        )
-        moved = Moved(drawing.places, flows.lens, np.zeros(len(flows.counted)))
+        shown = (drawn, target, weights, layers)
+        samples = take_samples(drawing, *shown, answers, flows.lens, scale=scene.scale)
+        moved = Moved(np.eye(3), np.zeros(3), flows.lens, np.zeros(len(flows.counted)))
         return sum_up(samples, moved, flows, answers)
 
     def pictures(self, guess: Guess) -> Pictures:

@@ -10,7 +10,6 @@ right brings what was to its left, so G takes the gradient with a minus.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -18,33 +17,14 @@ from numba import njit
 from mien.arrays import Array, Float, Int
 from mien.numeric.threads import for_row_bands
 from mien.track.flows import POSE_UNKNOWNS, Flows, pose_flow
-from mien.track.samples import Moved, Samples, look_up, sample_place
+from mien.track.samples import Answers, Moved, Samples, look_up
 
-_BLOCKS = 8
-"""Bands of rows that are summed up apart: the same sums, whatever the number of threads."""
-
-
-class Answers(NamedTuple):
-    """Which of the N unknowns, the pose's seven and then the face's, concern which pixels.
-
-    Attributes:
-        sets, sizes: (S, A) unknowns that concern the same triangles, in the first `sizes` (S,) of
-            a row.
-        set_of: (F,) which row is each triangle's.
-        region: (N,) in which region the mixture of textures changes with it; -1 for none.
-        direction: (N,) along which column of Q it does.
-        Q: (K, L) float32, P02 eq. (4). masks: (V, R) float32 of the regions.
-        triangles: (F, 3) vertex indices.
-    """
-
-    sets: Int[Array, "s a"]
-    sizes: Int[Array, " s"]
-    set_of: Int[Array, " f"]
-    region: Int[Array, " n"]
-    direction: Int[Array, " n"]
-    Q: Float[Array, "k l"]
-    masks: Float[Array, "v r"]
-    triangles: Int[Array, "f 3"]
+_CHUNK = 256
+"""Samples that are worked on together: their columns stay in the nearest cache."""
+Part = tuple[int, int]
+"""Their first, and how many they are."""
+_BLOCK = 2000
+"""Samples, about, that are summed up apart: the same sums, whatever the number of threads."""
 
 
 def pose_answers(triangles: Int[Array, "f 3"]) -> Answers:
@@ -98,17 +78,17 @@ def sum_up(
             next to the same near by.
     Source: that a Hessian may be kept, Baker and Matthews, Lucas-Kanade 20 years on, 2004.
     """
-    height, width = samples.ids.shape
     sets, most = answers.sets.shape
     side = most if matrix else 0
-    matrices, vectors = np.zeros((_BLOCKS, sets, side, side)), np.zeros((_BLOCKS, sets, most))
-    totals = np.zeros((_BLOCKS, 2))
+    count = -(-len(samples.drawn) // _BLOCK)
+    matrices, vectors = np.zeros((count, sets, side, side)), np.zeros((count, sets, most))
+    totals = np.zeros((count, 2))
     inputs = (samples, moved, flows, answers)
 
     def blocks(first: int, end: int) -> None:
         _add_blocks(*inputs, first, end, matrices, vectors, totals)
 
-    for_row_bands(blocks, _BLOCKS, work=2 * height * width)
+    for_row_bands(blocks, count, work=5 * len(samples.drawn))
     count = len(answers.region)
     half, vector = np.zeros((count, count)), np.zeros(count)
     _scatter(matrices, vectors, answers.sets, answers.sizes, half, vector)
@@ -141,89 +121,151 @@ def _add_blocks(
     vectors: Array,
     totals: Array,
 ) -> None:
-    # Unpacked: to look at an array in a tuple, pixel by pixel, takes half as long again.
-    ids, barycentrics, depth, drawn, target, weights, slopes, mean, along, scale = samples
-    slopes = mean if matrices.shape[2] else slopes
-    places, lens, step = moved
-    face, t, (focal, cx, cy), counted = flows
-    sets, sizes, set_of, region, direction, _, masks, triangles = answers
-    pose, columns = np.empty((POSE_UNKNOWNS, 2)), np.empty(sets.shape[1])
-    height, width = ids.shape
-    tall = -(-height // len(totals))
-    for row in range(first * tall, min(end * tall, height)):
-        block = row // tall
-        for col in range(width):
-            weight = np.float64(weights[row, col])
-            if weight == 0.0:
-                continue
-            f = ids[row, col]
-            own = sets[set_of[f], : sizes[set_of[f]]]
-            corners = (triangles[f, 0], triangles[f, 1], triangles[f, 2])
-            b = barycentrics[row, col]
-            x, y = (col + 0.5 - cx) / focal, (row + 0.5 - cy) / focal
-            pose_flow(x, y, depth[row, col], t, focal, pose)
-            _move(slopes[row, col], pose, face, corners, b, own, counted, columns)
-            mixed = _mix(along[row, col], masks, corners, b, own, region, direction, step, columns)
-            x, y = sample_place(corners, b, places, lens)
-            r = look_up(target, x, y) - (drawn[row, col] + mixed)
-            trust = 1.0 / (1.0 + r * r / (scale * scale))
-            totals[block, 0] += weight * trust * r * r
-            totals[block, 1] += weight
-            weight *= trust * trust
-            _add(columns, weight, r, matrices[block, set_of[f]], vectors[block, set_of[f]], own)
+    most, starts = answers.sets.shape[1], samples.starts
+    columns = np.empty((most, _CHUNK), np.float32)
+    place = (np.empty(_CHUNK, np.float32), np.empty(_CHUNK, np.float32))
+    r, weights = np.empty(_CHUNK, np.float32), np.empty(_CHUNK, np.float32)
+    slopes = samples.first if matrices.shape[2] else samples.slopes
+    for block in range(first, end):
+        for s in range(len(answers.sets)):
+            own = answers.sets[s, : answers.sizes[s]]
+            count = starts[s + 1] - starts[s]
+            span = [starts[s] + count * edge // len(totals) for edge in (block, block + 1)]
+            for a in range(span[0], span[1], _CHUNK):
+                part = (a, min(_CHUNK, span[1] - a))
+                _move_with_pose(samples, slopes, flows, part, columns)
+                _move_rigidly(samples, moved, part, *place)
+                _move_with_face(samples, slopes, flows, own, moved.step, part, columns, *place)
+                _mix(samples, answers, own, moved.step, part, columns, r)
+                for n in range(part[1]):
+                    r[n] = look_up(samples.target, place[0][n], place[1][n]) - r[n]
+                _weigh(samples, part, r, weights, totals[block])
+                _add(columns, own, r, weights, part, matrices[block, s], vectors[block, s])
 
 
-@njit(inline="always")
-def _move(
-    slope: Array,
-    pose: Array,
-    face: Array,
-    corners: tuple[int, int, int],
-    b: Array,
-    own: Array,
-    counted: Array,
-    columns: Array,
+@njit(nogil=True, fastmath=True, error_model="numpy")
+def _move_with_pose(
+    samples: Samples, slopes: Array, flows: Flows, part: Part, columns: Array
 ) -> None:
-    """Fill in how a pixel changes where its own unknowns move it: the pose's seven come first."""
-    i, j, k = corners
+    """Fill in how samples change where the pose's unknowns move them."""
+    first, count = part
+    x, y, z = samples.x[first:], samples.y[first:], samples.z[first:]
+    gx, gy = slopes[0][first:], slopes[1][first:]
+    t = (np.float32(flows.t[0]), np.float32(flows.t[1]), np.float32(flows.t[2]))
+    focal = np.float32(flows.lens[0])
+    for n in range(count):
+        flow = pose_flow(x[n], y[n], z[n], t, focal)
+        columns[0, n] = gx[n] * flow[0][0] + gy[n] * flow[0][1]
+        columns[1, n] = gx[n] * flow[1][0] + gy[n] * flow[1][1]
+        columns[2, n] = gx[n] * flow[2][0] + gy[n] * flow[2][1]
+        columns[3, n] = gx[n] * flow[3][0] + gy[n] * flow[3][1]
+        columns[4, n] = gx[n] * flow[4][0] + gy[n] * flow[4][1]
+        columns[5, n] = gx[n] * flow[5][0] + gy[n] * flow[5][1]
+        columns[6, n] = gx[n] * flow[6][0] + gy[n] * flow[6][1]
     for p in range(POSE_UNKNOWNS):
-        columns[p] = counted[p] * (slope[0] * pose[p, 0] + slope[1] * pose[p, 1])
-    for a in range(POSE_UNKNOWNS, len(own)):
-        n = own[a] - POSE_UNKNOWNS
-        x = b[0] * face[i, n, 0] + b[1] * face[j, n, 0] + b[2] * face[k, n, 0]
-        y = b[0] * face[i, n, 1] + b[1] * face[j, n, 1] + b[2] * face[k, n, 1]
-        columns[a] = counted[own[a]] * (slope[0] * x + slope[1] * y)
+        columns[p] *= flows.counted[p]
 
 
-@njit(inline="always")
-def _mix(
-    along: Array,
-    masks: Array,
-    corners: tuple[int, int, int],
-    b: Array,
+@njit(nogil=True, fastmath=True, error_model="numpy")
+def _move_rigidly(samples: Samples, moved: Moved, part: Part, cols: Array, rows: Array) -> None:
+    """Fill in where samples are now, were the face rigid: the first pixel's centre is at 0, 0."""
+    first, count = part
+    x, y, z = samples.x[first:], samples.y[first:], samples.z[first:]
+    R, t = moved.turn.astype(np.float32), moved.shift.astype(np.float32)
+    focal = np.float32(moved.lens[0])
+    cx, cy = np.float32(moved.lens[1] - 0.5), np.float32(moved.lens[2] - 0.5)
+    for n in range(count):
+        X, Y, Z = x[n] * z[n], y[n] * z[n], z[n]
+        scale = focal / (R[2, 0] * X + R[2, 1] * Y + R[2, 2] * Z + t[2])
+        cols[n] = scale * (R[0, 0] * X + R[0, 1] * Y + R[0, 2] * Z + t[0]) + cx
+        rows[n] = scale * (R[1, 0] * X + R[1, 1] * Y + R[1, 2] * Z + t[1]) + cy
+
+
+@njit(nogil=True, fastmath=True, error_model="numpy")
+def _move_with_face(
+    samples: Samples,
+    slopes: Array,
+    flows: Flows,
     own: Array,
-    region: Array,
-    direction: Array,
     step: Array,
+    part: Part,
     columns: Array,
-) -> float:
-    """Add how it changes where they change the mixture; by how much their step has changed it."""
-    i, j, k = corners
-    mixed = 0.0
-    for a in range(len(own)):
-        n = region[own[a]]
-        if n >= 0:
-            share = b[0] * masks[i, n] + b[1] * masks[j, n] + b[2] * masks[k, n]
-            change = share * along[direction[own[a]]]
-            columns[a] += change
-            mixed += step[own[a]] * change
-    return mixed
+    cols: Array,
+    rows: Array,
+) -> None:
+    """Fill in the columns of the face's unknowns; add by how much their step moves the samples."""
+    first, count = part
+    gx, gy = slopes[0][first:], slopes[1][first:]
+    corners, barycentrics = samples.corners[first:], samples.barycentrics[first:]
+    face, counted, by = flows.face, flows.counted, step.astype(np.float32)
+    for n in range(count):
+        i, j, k = corners[n, 0], corners[n, 1], corners[n, 2]
+        b0, b1, b2 = barycentrics[n, 0], barycentrics[n, 1], barycentrics[n, 2]
+        for a in range(POSE_UNKNOWNS, len(own)):
+            p = own[a] - POSE_UNKNOWNS
+            u = b0 * face[i, p, 0] + b1 * face[j, p, 0] + b2 * face[k, p, 0]
+            v = b0 * face[i, p, 1] + b1 * face[j, p, 1] + b2 * face[k, p, 1]
+            columns[a, n] = counted[own[a]] * (gx[n] * u + gy[n] * v)
+            cols[n] += by[own[a]] * u
+            rows[n] += by[own[a]] * v
 
 
-@njit(inline="always")
-def _add(columns: Array, weight: float, r: float, matrix: Array, vector: Array, own: Array) -> None:
+@njit(nogil=True, fastmath=True, error_model="numpy")
+def _mix(
+    samples: Samples,
+    answers: Answers,
+    own: Array,
+    step: Array,
+    part: Part,
+    columns: Array,
+    drawn: Array,
+) -> None:
+    """Add how samples change where unknowns change the mixture; fill in what their step drew."""
+    first, count = part
+    drawn[:count] = samples.drawn[first : first + count]
     for a in range(len(own)):
-        part = weight * columns[a]
-        vector[a] += part * r
-        for b in range(min(a + 1, len(matrix))):
-            matrix[a, b] += part * columns[b]
+        if answers.region[own[a]] >= 0:
+            shares = samples.shares[answers.region[own[a]]][first:]
+            along = samples.along[answers.direction[own[a]]][first:]
+            by = np.float32(step[own[a]])
+            for n in range(count):
+                change = shares[n] * along[n]
+                columns[a, n] += change
+                drawn[n] += by * change
+
+
+@njit(nogil=True, fastmath=True, error_model="numpy")
+def _weigh(samples: Samples, part: Part, r: Array, weights: Array, totals: Array) -> None:
+    """Fill in robust weights; add up w rho(r) and w."""
+    first, count = part
+    given, one = samples.weights[first:], np.float32(1)
+    inverse = np.float32(1 / samples.scale**2)
+    squares = total = np.float32(0)
+    for n in range(count):
+        trust = one / (one + r[n] * r[n] * inverse)
+        weights[n] = given[n] * trust * trust
+        squares += given[n] * trust * r[n] * r[n]
+        total += given[n]
+    totals[0] += squares
+    totals[1] += total
+
+
+@njit(nogil=True, fastmath=True, error_model="numpy")
+def _add(
+    columns: Array, own: Array, r: Array, weights: Array, part: Part, matrix: Array, vector: Array
+) -> None:
+    count = part[1]
+    for a in range(len(own)):
+        one = columns[a]
+        total = np.float32(0)
+        for n in range(count):
+            total += one[n] * weights[n] * r[n]
+        vector[a] += total
+    for a in range(min(len(own), len(matrix))):
+        one = columns[a]
+        for b in range(a + 1):
+            other = columns[b]
+            total = np.float32(0)
+            for n in range(count):
+                total += one[n] * weights[n] * other[n]
+            matrix[a, b] += total

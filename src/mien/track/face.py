@@ -19,10 +19,11 @@ from mien.mesh import Mesh
 from mien.model.head import Head
 from mien.render.mipmap import build_pyramids
 from mien.render.mix import prepare_painted
-from mien.track.equations import Answers
+from mien.track.equations import pose_answers
 from mien.track.flows import POSE_UNKNOWNS
 from mien.track.grey import grey_pyramids
 from mien.track.penalty import Limits
+from mien.track.samples import Answers
 from mien.track.state import Layout
 
 REGIONS = ("mouth", "eyes", "forehead")
@@ -84,7 +85,7 @@ class TrackedFace:
         painted: triangles that can be seen, with their textures; grey: these in grey.
         compared: (F,) bool: those of the face, whose pixels count.
         moves: (P, V, 3) mm by which a step of 1 in each parameter moves each vertex.
-        answers: which unknowns concern which triangles.
+        answers: which unknowns concern which triangles; pose_answers: of the pose's alone.
         region_of: (F,) the region that each triangle belongs to most; -1 for none.
     Raises: InputError: as Rig; an unknown region or unit.
     """
@@ -114,6 +115,7 @@ class TrackedFace:
         self.moves = frozen(np.stack(moves))
         self._sparse_moves = SparseOffsets.of(self.moves)
         self.answers = self._answers()
+        self.pose_answers = pose_answers(self.painted.triangles)
         shares = self._masks[mesh.triangles].mean(axis=1)
         self.region_of = frozen(np.where(shares.max(axis=1) > 0, shares.argmax(axis=1), -1))
 

@@ -9,6 +9,7 @@ from numba import njit
 
 from mien.arrays import Array, Float
 from mien.track.drawing import Pose
+from mien.track.samples import Lens
 from mien.track.views import View
 
 POSE_UNKNOWNS = 7
@@ -27,7 +28,7 @@ class Flows(NamedTuple):
 
     face: Float[Array, "v p 2"]
     t: Float[Array, " 3"]
-    lens: tuple[float, float, float]
+    lens: Lens
     counted: Float[Array, " n"]
 
 
@@ -39,10 +40,15 @@ def screen_flows(
     Source: P02 app. B.1, B.2.
     """
     face = np.empty((len(places), len(moves), 2), np.float32)
-    focal = float(view.focal * pose.zoom)
-    _flow_rows(moves, places, pose.R, focal, face)
+    lens = lens_of(view, pose)
+    _flow_rows(moves, places, pose.R, lens[0], face)
     counted = np.ones(POSE_UNKNOWNS + len(moves), np.float32)
-    return Flows(face, pose.t, (focal, view.cx, view.cy), counted)
+    return Flows(face, pose.t, lens, counted)
+
+
+def lens_of(view: View, pose: Pose) -> Lens:
+    """Of a view, as the pose zooms it."""
+    return float(view.focal * pose.zoom), view.cx, view.cy
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
@@ -70,23 +76,32 @@ def vertex_flows(flows: Flows, places: Float[Array, "v 3"]) -> Float[Array, "v n
 def _pose_rows(places: Array, t: Array, focal: float, pose: Array) -> None:
     for v in range(len(places)):
         x, y = places[v, 0] / places[v, 2], places[v, 1] / places[v, 2]
-        pose_flow(x, y, places[v, 2], t, focal, pose[v])
+        flow = pose_flow(x, y, places[v, 2], (t[0], t[1], t[2]), focal)
+        for p in range(POSE_UNKNOWNS):
+            pose[v, p, 0], pose[v, p, 1] = flow[p]
+
+
+Pair = tuple[float, float]
 
 
 @njit(inline="always")
-def pose_flow(x: float, y: float, z: float, t: Array, focal: float, flow: Array) -> None:
-    """Fill in px by which each unknown moves a point at depth z: f/z (dX - x dZ, dY - y dZ).
+def pose_flow(
+    x: float, y: float, z: float, t: tuple[float, float, float], focal: float
+) -> tuple[Pair, Pair, Pair, Pair, Pair, Pair, Pair]:
+    """Px by which each of the pose's unknowns moves a point: f/z (dX - x dZ, dY - y dZ).
 
     Args:
-        x, y: X/z and Y/z of the point, camera space.
+        x, y: X/z and Y/z of the point, camera space. z: its depth.
     """
     scale = focal / z
     # R m, about which the head turns: the place less the translation.
     X, Y, Z = x * z - t[0], y * z - t[1], z - t[2]
-    flow[0, 0], flow[0, 1] = scale * (-x * Y), scale * (-Z - y * Y)
-    flow[1, 0], flow[1, 1] = scale * (Z + x * X), scale * (y * X)
-    flow[2, 0], flow[2, 1] = scale * (-Y), scale * X
-    flow[3, 0], flow[3, 1] = scale, 0.0
-    flow[4, 0], flow[4, 1] = 0.0, scale
-    flow[5, 0], flow[5, 1] = -scale * x, -scale * y
-    flow[6, 0], flow[6, 1] = focal * x, focal * y
+    return (
+        (scale * (-x * Y), scale * (-Z - y * Y)),
+        (scale * (Z + x * X), scale * (y * X)),
+        (scale * (-Y), scale * X),
+        (scale, 0 * scale),
+        (0 * scale, scale),
+        (-scale * x, -scale * y),
+        (focal * x, focal * y),
+    )

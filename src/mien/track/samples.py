@@ -16,31 +16,64 @@ from mien.numeric.threads import for_row_bands
 from mien.track.drawing import Drawing
 
 
-class Samples(NamedTuple):
-    """A drawing as it is compared with a frame.
+class Answers(NamedTuple):
+    """Which of the N unknowns, the pose's seven and then the face's, concern which pixels.
 
     Attributes:
-        ids, barycentrics, depth: of Drawing.
-        drawn: (h, w) float32 luma, plain or filtered.
-        target: (h, w) float32 luma of the frame, plain or filtered alike.
-        weights: (h, w) float32; 0 where the pixel or one around it does not show the face.
-        slopes: (h, w, 2) float32: how drawn changes at a pixel where it moves by a px to the right,
+        sets, sizes: (S, A) unknowns that concern the same triangles, in the first `sizes` (S,) of
+            a row; the pose's come first.
+        set_of: (F,) which row is each triangle's.
+        region: (N,) in which region the mixture of textures changes with it; -1 for none.
+        direction: (N,) along which column of Q it does.
+        Q: (K, L) float32, P02 eq. (4). masks: (V, R) float32 of the regions.
+        triangles: (F, 3) vertex indices.
+    """
+
+    sets: Int[Array, "s a"]
+    sizes: Int[Array, " s"]
+    set_of: Int[Array, " f"]
+    region: Int[Array, " n"]
+    direction: Int[Array, " n"]
+    Q: Float[Array, "k l"]
+    masks: Float[Array, "v r"]
+    triangles: Int[Array, "f 3"]
+
+
+class Samples(NamedTuple):
+    """The N pixels that are compared, those of one set of Answers after those of another.
+
+    Attributes:
+        starts: (S + 1,) each set's first.
+        corners: (N, 3) vertices of its triangle. barycentrics: (N, 3) float32.
+        x, y, z: (N,) float32 X/Z, Y/Z and Z mm, camera space, where it was drawn.
+        drawn: (N,) float32 luma, plain or filtered. weights: (N,) float32.
+        slopes: (2, N) float32: how drawn changes at a pixel where it moves by a px to the right,
             and down. first: the mean of drawn's and the target's, for the step from where samples
             were drawn.
-        along: (h, w, L) float32: how drawn changes with each direction of the mixture.
+        along: (L, N) float32: how drawn changes with each direction of the mixture, were it
+            everywhere; shares: (R, N) float32 of the regions in the pixel.
+        target: (h, w) float32 luma of the frame, plain or filtered alike.
         scale: grey levels. Geman and McClure's: a pixel that is off by it counts a quarter.
     """
 
-    ids: Int[Array, "h w"]
-    barycentrics: Float[Array, "h w 3"]
-    depth: Float[Array, "h w"]
-    drawn: Float[Array, "h w"]
+    starts: Int[Array, " s"]
+    corners: Int[Array, "n 3"]
+    barycentrics: Float[Array, "n 3"]
+    x: Float[Array, " n"]
+    y: Float[Array, " n"]
+    z: Float[Array, " n"]
+    drawn: Float[Array, " n"]
+    weights: Float[Array, " n"]
+    slopes: Float[Array, "2 n"]
+    first: Float[Array, "2 n"]
+    along: Float[Array, "l n"]
+    shares: Float[Array, "r n"]
     target: Float[Array, "h w"]
-    weights: Float[Array, "h w"]
-    slopes: Float[Array, "h w 2"]
-    first: Float[Array, "h w 2"]
-    along: Float[Array, "h w l"]
     scale: float
+
+
+Lens = tuple[float, float, float]
+"""Focal length and principal point, px."""
 
 
 def take_samples(
@@ -49,30 +82,55 @@ def take_samples(
     target: Float[Array, "h w"],
     weights: Float[Array, "h w"],
     layers: Float[Array, "h w k"],
-    Q: Float[Array, "k l"],
+    answers: Answers,
+    lens: Lens,
     *,
     scale: float,
 ) -> Samples:
-    """A drawing's samples.
+    """Samples of a drawing.
 
     Args:
         drawn, target: luma, plain or filtered; layers: the expressions' pictures, likewise.
-        weights: of the pixels.
-        Q: directions in which the mixture changes, P02 eq. (4).
+        weights: of the pixels. lens: of the drawing.
         scale: of Samples.
     """
     height, width = drawing.ids.shape
-    slopes, mean = np.empty((2, height, width, 2), np.float32)
-    along = np.empty((height, width, Q.shape[1]), np.float32)
-    whole = np.empty((height, width), np.float32)
-    inputs = (drawing.ids, drawn, target, weights, layers, Q)
+    weights = _inside(weights, drawing.ids)
+    counts = np.zeros((height, len(answers.sets)), np.int64)
+    for_row_bands(
+        lambda a, b: _count_rows(drawing.ids, weights, answers.set_of, a, b, counts),
+        height,
+        work=width * height // 2,
+    )
+    # Where in the order of sets, and in a set of rows, each row's own begin.
+    ends = np.cumsum(counts.T).reshape(counts.T.shape).T
+    begins = ends - counts
+    samples = _empty(np.append(begins[0], counts.sum()), answers, target, scale)
+    inputs = (drawing, drawn, weights, layers, answers, lens, begins)
+    for_row_bands(
+        lambda a, b: _sample_rows(*inputs, a, b, samples), height, work=2 * width * height
+    )
+    return samples
 
-    def rows(first: int, end: int) -> None:
-        _sample_rows(*inputs, first, end, whole, slopes, mean, along)
 
-    for_row_bands(rows, height, work=2 * width * height)
-    shown = (drawing.ids, drawing.barycentrics, drawing.depth)
-    return Samples(*shown, drawn, target, whole, slopes, mean, along, scale)
+def _empty(
+    starts: Int[Array, " s"], answers: Answers, target: Float[Array, "h w"], scale: float
+) -> Samples:
+    total = int(starts[-1])
+    x, y, z, drawn, weights = np.empty((5, total), np.float32)
+    slopes, mean = np.empty((2, 2, total), np.float32)
+    return Samples(
+        starts,
+        np.empty((total, 3), np.int32),
+        np.empty((total, 3), np.float32),
+        *(x, y, z),
+        *(drawn, weights),
+        *(slopes, mean),
+        np.empty((answers.Q.shape[1], total), np.float32),
+        np.empty((answers.masks.shape[1], total), np.float32),
+        target,
+        scale,
+    )
 
 
 @njit(inline="always")
@@ -87,90 +145,95 @@ def _sobel(picture: Array, row: int, col: int) -> tuple[float, float]:
     return -x / np.float32(8.0), -y / np.float32(8.0)
 
 
-@njit(inline="always")
-def _whole(ids: Array, row: int, col: int) -> bool:
-    """Whether the pixel and all eight around it show the face.
+def _inside(weights: Float[Array, "h w"], ids: Int[Array, "h w"]) -> Float[Array, "h w"]:
+    """The weights, 0 where a pixel or one of the eight around it does not show the face.
 
     At the outline there is no gradient, and a frame's pixel mixes the face with what is behind it.
     """
-    if row == 0 or col == 0 or row == ids.shape[0] - 1 or col == ids.shape[1] - 1:
-        return False
-    for a in range(row - 1, row + 2):
-        for b in range(col - 1, col + 2):
-            if ids[a, b] < 0:
-                return False
-    return True
+    import cv2
+
+    whole = cv2.erode(np.uint8(ids >= 0), np.ones((3, 3), np.uint8), borderValue=0)
+    inside: Array = weights * whole
+    return inside
+
+
+@njit(cache=True, nogil=True)
+def _count_rows(
+    ids: Array, weights: Array, set_of: Array, first: int, end: int, counts: Array
+) -> None:
+    for row in range(first, end):
+        for col in range(ids.shape[1]):
+            if weights[row, col] > 0:
+                counts[row, set_of[ids[row, col]]] += 1
 
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _sample_rows(
-    ids: Array,
+    drawing: Drawing,
     drawn: Array,
-    target: Array,
     weights: Array,
     layers: Array,
-    Q: Array,
+    answers: Answers,
+    lens: Lens,
+    begins: Array,
     first: int,
     end: int,
-    whole: Array,
-    slopes: Array,
-    mean: Array,
-    along: Array,
+    samples: Samples,
 ) -> None:
-    """Fill in weights of whole pixels, slopes and along; what has no weight is left as it is.
+    """Fill in the samples of some rows of the drawing.
 
     The mean of both pictures' slopes takes half the iterations that the drawn one's alone take:
     Benhimane and Malis, Real-time image-based tracking of planes using efficient second-order
     minimization, 2004. It is of no use where samples have moved, for there the target's is another.
     """
     half = np.float32(0.5)
+    # Unpacked: to look at an array in a tuple, pixel by pixel, takes half as long again.
+    ids, barycentrics, depth = drawing.ids, drawing.barycentrics, drawing.depth
+    Q, masks, triangles, set_of = answers.Q, answers.masks, answers.triangles, answers.set_of
+    focal, cx, cy = lens
+    _, corners, inside, xs, ys, zs, luma, counted, slopes, mean, along, shares, target, _ = samples
     for row in range(first, end):
+        begin = begins[row].copy()
         for col in range(ids.shape[1]):
-            whole[row, col] = 0.0
-            if weights[row, col] == 0.0 or not _whole(ids, row, col):
+            if weights[row, col] == 0:
                 continue
-            whole[row, col] = weights[row, col]
-            drawn_x, drawn_y = _sobel(drawn, row, col)
-            target_x, target_y = _sobel(target, row, col)
-            slopes[row, col, 0], slopes[row, col, 1] = drawn_x, drawn_y
-            mean[row, col, 0] = half * (drawn_x + target_x)
-            mean[row, col, 1] = half * (drawn_y + target_y)
+            t = ids[row, col]
+            n = begin[set_of[t]]
+            begin[set_of[t]] += 1
+            xs[n], ys[n] = (col + 0.5 - cx) / focal, (row + 0.5 - cy) / focal
+            zs[n] = depth[row, col]
+            luma[n], counted[n] = drawn[row, col], weights[row, col]
+            slopes[0, n], slopes[1, n] = _sobel(drawn, row, col)
+            x, y = _sobel(target, row, col)
+            mean[0, n], mean[1, n] = half * (x + slopes[0, n]), half * (y + slopes[1, n])
+            for corner in range(3):
+                corners[n, corner] = triangles[t, corner]
+                inside[n, corner] = barycentrics[row, col, corner]
             # Eq. (7)'s sum over k of dw_k/dp I^_k, but for the region's share.
             for d in range(Q.shape[1]):
-                change = np.float32(0.0)
-                for n in range(Q.shape[0]):
-                    change += Q[n, d] * layers[row, col, n]
-                along[row, col, d] = change
+                change = np.float32(0)
+                for k in range(Q.shape[0]):
+                    change += Q[k, d] * layers[row, col, k]
+                along[d, n] = change
+            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            b = barycentrics[row, col]
+            for r in range(masks.shape[1]):
+                shares[r, n] = b[0] * masks[i, r] + b[1] * masks[j, r] + b[2] * masks[k, r]
 
 
 class Moved(NamedTuple):
-    """Where a guess puts the head, and how far it is from what was drawn.
+    """Where a guess puts what was drawn.
 
     Attributes:
-        places: (V, 3) mm, camera space.
-        lens: focal length and principal point, px.
+        turn: (3, 3), shift: (3,) mm: turn @ place + shift, in camera space, were the face rigid.
+        lens: of the guess.
         step: (N,) the unknowns less those that were drawn.
     """
 
-    places: Float[Array, "v 3"]
-    lens: tuple[float, float, float]
+    turn: Float[Array, "3 3"]
+    shift: Float[Array, " 3"]
+    lens: Lens
     step: Float[Array, " n"]
-
-
-@njit(inline="always")
-def sample_place(
-    corners: tuple[int, int, int],
-    b: tuple[float, float, float],
-    places: Array,
-    lens: tuple[float, float, float],
-) -> tuple[float, float]:
-    """Where in the picture a place in a triangle is: px from the corner, first centre at 0."""
-    i, j, k = corners
-    focal, cx, cy = lens
-    X = b[0] * places[i, 0] + b[1] * places[j, 0] + b[2] * places[k, 0]
-    Y = b[0] * places[i, 1] + b[1] * places[j, 1] + b[2] * places[k, 1]
-    Z = b[0] * places[i, 2] + b[1] * places[j, 2] + b[2] * places[k, 2]
-    return focal * X / Z + cx - 0.5, focal * Y / Z + cy - 0.5
 
 
 @njit(inline="always")
