@@ -52,9 +52,9 @@ def test_the_truth_is_found(pixels: Array) -> None:
     found = fitted(pixels)
     assert_truth(found, degrees=0.1, share=0.002, weights=0.03)
     assert found is not None
-    assert found.rms < 2
-    assert found.seen > 0.9
-    assert found.likeness > 0.99
+    assert found.agreement.rms < 2
+    assert found.agreement.seen > 0.9
+    assert found.agreement.likeness > 0.99
     assert len(found.deviations) == COUNT
     np.testing.assert_allclose(found.colours.gain, 1, atol=0.03)
 
@@ -87,7 +87,7 @@ def test_a_hand_on_a_quarter_of_the_face(pixels: Array) -> None:
     found = fitted(covered, TRUTH.moved(0.3 * OFF))
     assert_truth(found, degrees=0.7, share=0.005, weights=0.15)
     assert found is not None
-    assert 0.55 < found.seen < 0.9
+    assert 0.55 < found.agreement.seen < 0.9
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_nobody_is_not_like_a_face() -> None:
     rng = np.random.default_rng(2)
     noise = rng.integers(0, 255, (patterned.SIZE, patterned.SIZE, 3)).astype(np.uint8)
     found = fitted(noise)
-    assert found is None or found.likeness < 0.5
+    assert found is None or found.agreement.likeness < 0.5
 
 
 def test_half_out_of_the_frame() -> None:
@@ -110,7 +110,7 @@ def test_half_out_of_the_frame() -> None:
     pixels = patterned.picture(beside)
     found = fitted(pixels, beside.moved(0.3 * OFF))
     assert found is not None
-    assert found.seen < 0.75
+    assert found.agreement.seen < 0.75
     assert np.degrees(angle_between(found.guess.pose.R, beside.pose.R)) < 0.5
 
 
@@ -119,4 +119,4 @@ def test_the_same_every_time(pixels: Array) -> None:
     assert one is not None
     assert other is not None
     np.testing.assert_array_equal(one.guess.since(TRUTH), other.guess.since(TRUTH))
-    assert one.rms == other.rms
+    assert one.agreement == other.agreement

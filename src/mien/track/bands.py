@@ -13,6 +13,9 @@ from numba import njit
 from mien.arrays import Array, Float
 from mien.numeric.threads import for_row_bands
 
+_PARTS = 2
+"""In which a picture is filtered, each with the rows around it that its means take in."""
+
 
 def band_pass(
     layers: Float[Array, "h w k"],
@@ -36,19 +39,22 @@ def band_pass(
     # At the outline a frame's pixel mixes the face with what is behind it.
     inner = cv2.erode(mask, np.ones((3, 3), np.uint8))
     inner *= weights
-    count = layers.shape[2]
-    weighted = np.empty((*mask.shape, count + 3), np.float32)
     inputs = (layers, luma, target)
-    for_row_bands(
-        lambda a, b: _weigh_rows(*inputs, inner, a, b, weighted), len(mask), work=weighted.size // 4
-    )
-    sums = cv2.blur(weighted, (width, width), borderType=cv2.BORDER_CONSTANT)
     bands = (np.empty_like(layers), np.empty_like(luma), np.empty_like(target))
-    for_row_bands(
-        lambda a, b: _subtract_rows(*inputs, mask, sums, a, b, *bands),
-        len(mask),
-        work=weighted.size // 4,
-    )
+    height, count = len(mask), layers.shape[2] + 3
+
+    def rows(first: int, end: int) -> None:
+        low, high = max(first - width // 2, 0), min(end + width // 2, height)
+        weighted = np.empty((high - low, mask.shape[1], count), np.float32)
+        _weigh_rows(*inputs, inner, low, weighted)
+        sums = cv2.blur(weighted, (width, width), borderType=cv2.BORDER_CONSTANT)
+        _subtract_rows(*inputs, mask, sums[first - low : end - low], first, *bands)
+
+    def parts(first: int, end: int) -> None:
+        for part in range(first, end):
+            rows(part * height // _PARTS, (part + 1) * height // _PARTS)
+
+    for_row_bands(parts, _PARTS, work=2 * mask.size * count)
     return bands
 
 
@@ -59,19 +65,19 @@ def _weigh_rows(
     target: Array,
     inner: Array,
     first: int,
-    end: int,
     weighted: Array,
 ) -> None:
-    """Fill in layers, luma, target and 1, all times the weights."""
+    """Fill in layers, luma, target and 1, all times the weights, of rows from `first` on."""
     count = layers.shape[2]
-    for row in range(first, end):
+    for own in range(len(weighted)):
+        row = first + own
         for col in range(inner.shape[1]):
             weight = inner[row, col]
             for n in range(count):
-                weighted[row, col, n] = weight * layers[row, col, n]
-            weighted[row, col, count] = weight * luma[row, col]
-            weighted[row, col, count + 1] = weight * target[row, col]
-            weighted[row, col, count + 2] = weight
+                weighted[own, col, n] = weight * layers[row, col, n]
+            weighted[own, col, count] = weight * luma[row, col]
+            weighted[own, col, count + 1] = weight * target[row, col]
+            weighted[own, col, count + 2] = weight
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -82,26 +88,26 @@ def _subtract_rows(
     mask: Array,
     sums: Array,
     first: int,
-    end: int,
     layer_bands: Array,
     luma_band: Array,
     target_band: Array,
 ) -> None:
-    count = layers.shape[2]
-    for row in range(first, end):
+    count, smallest = layers.shape[2], np.float32(1e-6)
+    for own in range(len(sums)):
+        row = first + own
         for col in range(mask.shape[1]):
-            share = sums[row, col, count + 2]
-            shown = mask[row, col] > 0.0 and share > 1e-6
+            share = sums[own, col, count + 2]
+            shown = mask[row, col] > 0.0 and share > smallest
             # Outside everything is 0: a picture and its mean alike.
             inverse = np.float32(1.0) / share if shown else np.float32(0.0)
             keep = np.float32(1.0) if shown else np.float32(0.0)
             for n in range(count):
-                mean = sums[row, col, n] * inverse
+                mean = sums[own, col, n] * inverse
                 layer_bands[row, col, n] = keep * layers[row, col, n] - mean
-            luma_band[row, col] = keep * luma[row, col] - sums[row, col, count] * inverse
+            luma_band[row, col] = keep * luma[row, col] - sums[own, col, count] * inverse
             target_band[row, col] = 0.0
-            if share > 1e-6:
-                target_band[row, col] = target[row, col] - sums[row, col, count + 1] / share
+            if share > smallest:
+                target_band[row, col] = target[row, col] - sums[own, col, count + 1] / share
 
 
 def odd(width: float) -> int:

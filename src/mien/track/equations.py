@@ -137,8 +137,7 @@ def _add_blocks(
                 _move_rigidly(samples, moved, part, *place)
                 _move_with_face(samples, slopes, flows, own, moved.step, part, columns, *place)
                 _mix(samples, answers, own, moved.step, part, columns, r)
-                for n in range(part[1]):
-                    r[n] = look_up(samples.target, place[0][n], place[1][n]) - r[n]
+                _compare(samples.target, part, *place, r)
                 _weigh(samples, part, r, weights, totals[block])
                 _add(columns, own, r, weights, part, matrices[block, s], vectors[block, s])
 
@@ -202,7 +201,7 @@ def _move_with_face(
         i, j, k = corners[n, 0], corners[n, 1], corners[n, 2]
         b0, b1, b2 = barycentrics[n, 0], barycentrics[n, 1], barycentrics[n, 2]
         for a in range(POSE_UNKNOWNS, len(own)):
-            p = own[a] - POSE_UNKNOWNS
+            p = np.uint32(own[a] - POSE_UNKNOWNS)
             u = b0 * face[i, p, 0] + b1 * face[j, p, 0] + b2 * face[k, p, 0]
             v = b0 * face[i, p, 1] + b1 * face[j, p, 1] + b2 * face[k, p, 1]
             columns[a, n] = counted[own[a]] * (gx[n] * u + gy[n] * v)
@@ -232,6 +231,15 @@ def _mix(
                 change = shares[n] * along[n]
                 columns[a, n] += change
                 drawn[n] += by * change
+
+
+@njit(nogil=True, fastmath=True, error_model="numpy")
+def _compare(target: Array, part: Part, cols: Array, rows: Array, r: Array) -> None:
+    """The target at these places, less what was in r."""
+    height, width = target.shape
+    flat = target.reshape(height * width)
+    for n in range(part[1]):
+        r[n] = look_up(flat, width, height, cols[n], rows[n]) - r[n]
 
 
 @njit(nogil=True, fastmath=True, error_model="numpy")

@@ -8,6 +8,7 @@ import numpy as np
 
 from mien.arrays import Array, Bool, Float, UInt8
 from mien.camera import Camera
+from mien.track.agreement import Agreement, agreement
 from mien.track.colours import Colours, match_colours
 from mien.track.differences import by_differences, unknowns_named
 from mien.track.drawing import Pose, draw_colours
@@ -18,7 +19,7 @@ from mien.track.looks import Look, Pictures, Scene, by_bands, by_plain_pictures
 from mien.track.phases import Answer, solve
 from mien.track.restart import better_start
 from mien.track.trust import LEAST_SCALE, patch_trust, usual_difference
-from mien.track.views import BRIGHTEST, View, cut_views
+from mien.track.views import View, cut_views
 
 _FIRST_SCALE = 60.0
 """Grey levels by which a pixel may be off before anything is fitted."""
@@ -56,18 +57,14 @@ class Fitted:
         guess: of least cost. deviations: (N,) of its unknowns.
         information: (N - 1, N - 1) inverse covariance of all but the focal length.
         colours: of the frame over the drawn ones.
-        rms: grey levels, over the pixels that count.
-        seen: their share of the face.
-        likeness: correlation of frame and drawn face over them, from -1 to 1.
+        agreement: of the frame and the drawn face.
     """
 
     guess: Guess
     deviations: Float[Array, " n"]
     information: Float[Array, "m m"]
     colours: Colours
-    rms: float
-    seen: float
-    likeness: float
+    agreement: Agreement
 
 
 class FrameFit:
@@ -133,7 +130,8 @@ class FrameFit:
         # Drawn once more where it was found: to a tenth of a pixel that makes a difference.
         look = answer.look.again(answer.guess)
         answer = self._solved(look, belief, self._both, last=True)
-        return _fitted(scene, answer, known)
+        found = (answer.guess, answer.deviations, answer.information)
+        return Fitted(*found, known, agreement(answer.pictures, scene.view, scene.weights))
 
     def _roughly(self, scene: Scene, start: Guess, belief: Belief) -> tuple[Answer, Belief]:
         """On the smallest size; and what is expected after it."""
@@ -216,23 +214,3 @@ def _enlarged(trust: Float[Array, "h w"], view: View) -> Float[Array, "h w"]:
     import cv2
 
     return np.asarray(cv2.resize(trust, view.size, interpolation=cv2.INTER_LINEAR))
-
-
-def _fitted(scene: Scene, answer: Answer, colours: Colours) -> Fitted:
-    """How well the face explains the frame, over the pixels that count."""
-    pictures = answer.pictures
-    weights = scene.weights * pictures.mask
-    shown = pictures.mask > 0
-    # Too bright to tell is neither covered nor outside of the frame.
-    untold = scene.view.pixels[shown & (scene.view.inside < 0.5)]
-    bright = np.count_nonzero(untold.max(axis=1) > BRIGHTEST) if len(untold) else 0
-    seen = float(weights.sum() / max(np.count_nonzero(shown) - bright, 1))
-    chosen = weights > 0.25
-    a, b = pictures.drawn[chosen], pictures.target[chosen]
-    found = (answer.guess, answer.deviations, answer.information)
-    if len(a) < 2:
-        return Fitted(*found, colours, np.inf, seen, 0.0)
-    rms = float(np.sqrt(((a - b) ** 2).mean()))
-    a, b = a - a.mean(), b - b.mean()
-    likeness = float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9))
-    return Fitted(*found, colours, rms, seen, likeness)

@@ -215,6 +215,8 @@ def _picture_rows(
     )
     masks, triangles = answers.masks, answers.triangles
     focal, cx, cy = lens
+    height, width = plain.shape
+    flat = plain.reshape(height * width)
     for row in range(first, end):
         for col in range(drawn.shape[1]):
             t = ids[row, col]
@@ -231,5 +233,5 @@ def _picture_rows(
             X = b[0] * places[i, 0] + b[1] * places[j, 0] + b[2] * places[k, 0]
             Y = b[0] * places[i, 1] + b[1] * places[j, 1] + b[2] * places[k, 1]
             Z = b[0] * places[i, 2] + b[1] * places[j, 2] + b[2] * places[k, 2]
-            x, y = focal * X / Z + cx - 0.5, focal * Y / Z + cy - 0.5
-            target[row, col] = look_up(plain, x, y)
+            x, y = np.float32(focal * X / Z + cx - 0.5), np.float32(focal * Y / Z + cy - 0.5)
+            target[row, col] = look_up(flat, width, height, x, y)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -30,25 +31,40 @@ class Answer:
     """What a phase found.
 
     Attributes:
-        guess: of least cost.
-        deviations: (N,) standard deviations of the unknowns given picture and belief; the belief's
-            own for those that were not free.
-        information: (M, M) inverse covariance of the free unknowns.
-        look: at the scene, around the start. iterations: linearizations made.
+        guess: of least cost. look: at the scene, around the start.
+        matrix: (N, N) of the pixels' normal equations, in units of the cost.
+        belief: as it was given. free: (N,) which unknowns were solved for.
+        iterations: linearizations made.
         rms: grey levels, of the pixels' weighted residual.
     """
 
     guess: Guess
-    deviations: Float[Array, " n"]
-    information: Float[Array, "m m"]
     look: Look
+    matrix: Float[Array, "n n"]
+    belief: Belief
+    free: Bool[Array, " n"]
     iterations: int
     rms: float
 
-    @property
+    @cached_property
     def pictures(self) -> Pictures:
         """Of the guess."""
         return self.look.pictures(self.guess)
+
+    @cached_property
+    def information(self) -> Float[Array, "m m"]:
+        """(M, M) inverse covariance of the free unknowns, given picture and belief."""
+        # Without D(p): that a weight is at the end of its range says nothing of how sure it is.
+        own = self.matrix[np.ix_(self.free, self.free)]
+        information: Array = own + np.diag(self.belief.deviations[self.free] ** -2.0)
+        return information
+
+    @property
+    def deviations(self) -> Float[Array, " n"]:
+        """(N,) of the unknowns; the belief's own for those that were not free."""
+        deviations = self.belief.deviations.copy()
+        deviations[self.free] = np.sqrt(np.diag(np.linalg.inv(self.information)))
+        return deviations
 
 
 def solve(
@@ -75,13 +91,9 @@ def solve(
         max_failures=1,
     )
     found, _ = problem.at(result.x)
-    # Without D(p): that a weight is at the end of its range says nothing of how sure it is.
-    information = problem.scale(found) * found.matrix[np.ix_(free, free)]
-    information += np.diag(belief.deviations[free] ** -2.0)
-    deviations = belief.deviations.copy()
-    deviations[free] = np.sqrt(np.diag(np.linalg.inv(information)))
     rms = float(np.sqrt(found.squares / max(found.weight, 1e-9)))
-    return Answer(result.x, deviations, information, look, result.iterations, rms)
+    matrix = problem.scale(found) * found.matrix
+    return Answer(result.x, look, matrix, belief, free, result.iterations, rms)
 
 
 class _Problem:

@@ -121,7 +121,7 @@ def _empty(
     slopes, mean = np.empty((2, 2, total), np.float32)
     return Samples(
         starts,
-        np.empty((total, 3), np.int32),
+        np.empty((total, 3), np.uint32),
         np.empty((total, 3), np.float32),
         *(x, y, z),
         *(drawn, weights),
@@ -237,36 +237,35 @@ class Moved(NamedTuple):
 
 
 @njit(inline="always")
-def look_up(picture: Array, x: float, y: float) -> float:
+def look_up(picture: Array, width: int, height: int, x: float, y: float) -> np.float32:
     """A picture between its pixels, by Catmull and Rom's spline; beyond it, its last rows go on.
 
     Between pixels a straight line would blur, the more the farther from both.
+
+    Args:
+        picture: (H * W,) float32, row after row. x, y: px, the first one's centre at 0, 0.
     """
-    height, width = picture.shape
-    x = min(max(x, 1.0), width - 2.001)
-    y = min(max(y, 1.0), height - 2.001)
+    x, y = min(max(x, 1.0), width - 2.001), min(max(y, 1.0), height - 2.001)
     col, row = int(x), int(y)
-    u, v = x - col, y - row
-    across = _spline(u)
-    above, below = _line(picture, row - 1, col, across), _line(picture, row + 2, col, across)
-    here, there = _line(picture, row, col, across), _line(picture, row + 1, col, across)
-    b = _spline(v)
-    value: float = b[0] * above + b[1] * here + b[2] * there + b[3] * below
-    return value
-
-
-@njit(inline="always")
-def _line(picture: Array, row: int, col: int, a: tuple[float, float, float, float]) -> float:
-    before, here = picture[row, col - 1], picture[row, col]
-    there, after = picture[row, col + 1], picture[row, col + 2]
-    total: float = a[0] * before + a[1] * here + a[2] * there + a[3] * after
+    a, b = _spline(np.float32(x - col)), _spline(np.float32(y - row))
+    # Unsigned: numbers that may be negative would be looked at one by one.
+    one, step = np.uint64(1), np.uint64(width)
+    n0 = np.uint64((row - 1) * width + col - 1)
+    n1, n2, n3 = n0 + step, n0 + step + step, n0 + step + step + step
+    total: np.float32 = 0 * b[0]
+    for share in a:
+        below = b[0] * picture[n0] + b[1] * picture[n1] + b[2] * picture[n2] + b[3] * picture[n3]
+        total += share * below
+        n0, n1, n2, n3 = n0 + one, n1 + one, n2 + one, n3 + one
     return total
 
 
 @njit(inline="always")
-def _spline(u: float) -> tuple[float, float, float, float]:
+def _spline(u: np.float32) -> tuple[np.float32, np.float32, np.float32, np.float32]:
     """Shares of the four pixels around a place that is u after the second."""
-    before = 0.5 * u * ((2.0 - u) * u - 1.0)
-    here = 0.5 * (u * u * (3.0 * u - 5.0) + 2.0)
-    there = 0.5 * u * ((4.0 - 3.0 * u) * u + 1.0)
-    return before, here, there, 0.5 * u * u * (u - 1.0)
+    half, one, two = np.float32(0.5), np.float32(1), np.float32(2)
+    three, four, five = np.float32(3), np.float32(4), np.float32(5)
+    before = half * u * ((two - u) * u - one)
+    here = half * (u * u * (three * u - five) + two)
+    there = half * u * ((four - three * u) * u + one)
+    return before, here, there, half * u * u * (u - one)

@@ -206,8 +206,8 @@ class Tracker:
             time,
             "ok",
             state,
-            fitted.rms,
-            fitted.seen,
+            fitted.agreement.rms,
+            fitted.agreement.seen,
             self._channel_deviations(fitted.deviations[POSE_UNKNOWNS:]),
             fitted.colours.gain,
             fitted.colours.bias,
@@ -229,9 +229,10 @@ class Tracker:
 
 
 def _if_like(fitted: Fitted | None) -> Fitted | None:
-    if fitted is None or fitted.likeness < _LEAST_LIKENESS or fitted.seen < _LEAST_SEEN:
+    if fitted is None:
         return None
-    return fitted
+    alike, seen = fitted.agreement.likeness, fitted.agreement.seen
+    return fitted if alike >= _LEAST_LIKENESS and seen >= _LEAST_SEEN else None
 
 
 def _blocks(model: TrackedFace) -> list[Block]:
