@@ -43,32 +43,7 @@ def test_what_no_lens_is(text: str) -> None:
         parse_lens(text, 1920, 1080)
 
 
-def test_a_picture_that_tells_nothing_changes_nothing() -> None:
-    before = LogFocal(np.log(800), 0.6**-2)
-    after = before.updated(np.zeros((7, 7)), np.zeros(7))
-    assert (after.mean, after.precision) == pytest.approx((before.mean, before.precision))
-
-
-def test_update_is_the_posterior_of_a_linear_model(rng: np.random.Generator) -> None:
-    jacobian, noise = rng.normal(size=(40, 7)), rng.normal(size=40)
-    before, truth = LogFocal(6.0, 0.3**-2), np.append(rng.normal(size=6), 6.4)
-    at = np.append(np.zeros(6), before.mean)
-    residuals = jacobian @ (at - truth) - noise
-    hessian, gradient = jacobian.T @ jacobian, jacobian.T @ residuals
-    after = before.updated(hessian, gradient)
-    precision = hessian.copy()
-    precision[6, 6] += before.precision
-    assert after.mean == pytest.approx(before.mean - np.linalg.solve(precision, gradient)[6])
-    assert after.deviation**2 == pytest.approx(np.linalg.inv(precision)[6, 6])
-    # Linearized elsewhere, the same picture says the same.
-    moved = gradient + hessian @ np.append(np.zeros(6), 0.2)
-    again = before.updated(hessian, moved, at=before.mean + 0.2)
-    assert again.mean == pytest.approx(after.mean)
-
-
-def test_bad_equations() -> None:
-    with pytest.raises(InputError, match=r"hessian: expected shape \(7, 7\)"):
-        LogFocal(6.0, 1.0).updated(np.zeros((6, 6)), np.zeros(7))
+def test_bad_precision() -> None:
     with pytest.raises(InputError, match="precision: expected a number above zero"):
         LogFocal(6.0, 0.0)
 

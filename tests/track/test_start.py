@@ -91,21 +91,6 @@ def test_shut_eyes_look_nowhere() -> None:
     np.testing.assert_array_equal(state.gaze, 0)
 
 
-def test_a_tracked_face_is_near_and_one_elsewhere_is_far() -> None:
-    state = posed()
-    face = face_of(state)
-    far = face_of(posed(t_cam_head=np.array([130.0, -20.0, 600.0])))
-    turned = face_of(posed((5, 13, 4)))
-    near, other, aside = (
-        starter().apart(seen, state, size=SIZE, focal_px=FOCAL) for seen in (face, far, turned)
-    )
-    assert near < 1e-6
-    assert other > 0.5
-    assert aside > 0.04
-    behind = posed(t_cam_head=np.array([0.0, 0.0, -600.0]))
-    assert starter().apart(face, behind, size=SIZE, focal_px=FOCAL) == np.inf
-
-
 def test_no_face_is_no_state() -> None:
     pixels = np.zeros((480, 640, 3), np.uint8)
     assert starter().find(pixels, focal_px=FOCAL) is None

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mien.arrays import Array, Float, check_array, check_positive
+from mien.arrays import check_positive
 from mien.capture.exif import FILM_DIAGONAL_MM
 from mien.errors import InputError
-from mien.model.dense.projection import UNKNOWNS
 from mien.model.head import Head
 from mien.model.landmark_fit import FOCAL_PRIOR_DEVIATION, FOCAL_PRIOR_DIAGONALS
 
@@ -68,31 +67,6 @@ class LogFocal:
     def deviation(self) -> float:
         """Standard deviation of the logarithm: 0.1 is about 10 %."""
         return float(self.precision**-0.5)
-
-    def updated(
-        self,
-        hessian: Float[Array, "7 7"],
-        gradient: Float[Array, " 7"],
-        *,
-        at: float | None = None,
-    ) -> LogFocal:
-        """After one more picture, whose own pose is of no further interest.
-
-        Args:
-            hessian, gradient: of half the picture's squares in units of their variance, over the
-                pose and, last, the log focal length (model.dense.projection.UNKNOWNS).
-            at: log focal length that they were taken at; the mean by default.
-        Raises: InputError: shapes, not finite.
-        """
-        hessian = check_array("hessian", hessian, (UNKNOWNS, UNKNOWNS))
-        gradient = check_array("gradient", gradient, (UNKNOWNS,))
-        at = self.mean if at is None else at
-        # Schur's complement of the pose, which may be determined in part only.
-        along = np.linalg.pinv(hessian[:-1, :-1], hermitian=True) @ hessian[:-1, -1]
-        told = max(float(hessian[-1, -1] - hessian[-1, :-1] @ along), 0.0)
-        slope = float(gradient[-1] - along @ gradient[:-1])
-        precision = self.precision + told
-        return LogFocal((self.precision * self.mean + told * at - slope) / precision, precision)
 
 
 def expected_focal(head: Head, width: int, height: int) -> LogFocal:

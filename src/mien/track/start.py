@@ -109,25 +109,6 @@ class Starter:
         gaze = self._eyes.gaze(camera, face.points[:, :2], weights)
         return TrackState(guess.R, guess.t, weights, units, gaze)
 
-    def apart(
-        self, face: DetectedFace, state: TrackState, *, size: tuple[int, int], focal_px: float
-    ) -> float:
-        """How far landmarks lie off those of a tracked head, on average, in widths of the face.
-
-        Below 0.01 where it is tracked well; 25 degrees of turn are 0.05, and a face elsewhere is
-        farther off.
-        """
-        seen = Observation.of(self.marks, face, size)
-        unknowns = np.concatenate([state.weights[:, 1:].ravel(), state.units])
-        camera = Camera(*size, focal_px, state.R_cam_head, state.t_cam_head)
-        guess = Guess(state.R_cam_head, state.t_cam_head, unknowns)
-        in_camera = camera.to_camera(seen.on(guess))
-        if in_camera[:, 2].min() <= 0:
-            return float("inf")
-        points = focal_px * in_camera[:, :2] / in_camera[:, 2:]
-        distances = np.linalg.norm(points - seen.image_points, axis=1)
-        return float(np.average(distances, weights=1 / seen.sigma_mm**2)) / face.width
-
     def _weights(self, face: Float[Array, " p"]) -> tuple[Array, Array]:
         """(R, K) blending weights, neutral first, and (U,) of units."""
         regions, expressions = len(self.layout.regions), len(self.layout.expressions) - 1
