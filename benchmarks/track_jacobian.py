@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -86,9 +86,6 @@ class _Timed:
 
     def pictures(self, guess: Guess) -> Pictures:
         return self.scene.pictures(guess)
-
-    def again(self, guess: Guess) -> Look:
-        return replace(self, guess=guess)
 
 
 def cases(model: TrackedFace, shown: Performance, rng: np.random.Generator) -> Iterator[Case]:

@@ -57,7 +57,6 @@ def test_every_column_is_either_one_or_the_other(scene: Scene, guess: Guess, pla
 def test_pictures_are_those_of_the_guess(scene: Scene, guess: Guess) -> None:
     look = by_differences(np.ones(COUNT, bool))(scene, TRUTH)
     np.testing.assert_array_equal(look.pictures(guess).drawn, scene.draw(guess, layers=True).luma)
-    assert look.again(guess).guess is guess
 
 
 def test_exact_is_the_rigs_own_face(scene: Scene, guess: Guess) -> None:

@@ -45,7 +45,7 @@ def solved(
     answer = solve(linearized(scene, start), belief, free=free, iterations=30, tolerance=1e-9)
     # What was drawn for a start that is far says less of where it leads than what is drawn there.
     for _ in range(3):
-        look = answer.look.again(answer.guess)
+        look = linearized(scene, answer.guess)
         answer = solve(look, belief, free=free, iterations=30, tolerance=1e-9)
     return answer
 

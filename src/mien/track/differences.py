@@ -85,9 +85,6 @@ class _Redrawn:
     def pictures(self, guess: Guess) -> Pictures:
         return self._around(guess).pictures(guess)
 
-    def again(self, guess: Guess) -> Look:
-        return replace(self, guess=guess)
-
     def _around(self, guess: Guess) -> Scene:
         if not self.exact:
             return self.scene

@@ -96,9 +96,6 @@ class Look(Protocol):
     def pictures(self, guess: Guess) -> Pictures:
         """As the guess has them."""
 
-    def again(self, guess: Guess) -> Look:
-        """The same with the face drawn for another guess near by."""
-
 
 Linearize = Callable[[Scene, Guess], Look]
 
@@ -149,10 +146,6 @@ class _Sampled:
             return self._first
         found = sum_up(self.samples, self._moved(guess), self._flows, self.answers, matrix=False)
         return replace(self._padded(found), matrix=self._first.matrix)
-
-    def again(self, guess: Guess) -> Look:
-        plain = len(self.answers.region) == POSE_UNKNOWNS
-        return by_plain_pictures(self.scene, guess) if plain else by_bands(self.scene, guess)
 
     @cached_property
     def _first(self) -> Equations:
