@@ -17,13 +17,11 @@ from mien.formats.openface_csv import write_openface
 from mien.formats.track_csv import check_track_place, write_track
 from mien.formats.video import check_video_place
 from mien.model.head import Head
-from mien.render.picture import HeadRenderer
-from mien.report.track_overlay import write_overlay
-from mien.report.track_plots import PAGE, write_track_plots
 from mien.track.state import Track
 
 if TYPE_CHECKING:
     from mien.build import Progress
+    from mien.render.picture import HeadRenderer
 
 OVERLAY, PLOTS = "Drawing the overlay", "Drawing plots"
 
@@ -55,6 +53,8 @@ class TrackFiles:
         if self.overlay:
             check_video_place(self.overlay)
         if self.plots:
+            from mien.report.track_plots import PAGE
+
             check_file_place(self.plots / PAGE)
         for path in filter(None, (self.live_link, self.openface)):
             check_file_place(path)
@@ -76,12 +76,18 @@ class TrackFiles:
         elif self.live_link:
             yield f"{self.live_link}: not written: no frame shows the face"
         if self.overlay or self.plots:
+            from mien.render.picture import HeadRenderer
+
             self._draw(track, video, HeadRenderer(head), tell)
 
     def _draw(self, track: Track, video: Path, renderer: HeadRenderer, tell: Progress) -> None:
         if self.overlay:
+            from mien.report.track_overlay import write_overlay
+
             write_overlay(self.overlay, video, track, renderer, progress=partial(tell, OVERLAY))
         if self.plots:
+            from mien.report.track_plots import write_track_plots
+
             write_track_plots(
                 self.plots,
                 track,
