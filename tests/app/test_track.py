@@ -200,7 +200,7 @@ def test_stopped_while_it_drew(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("mien.app.track_files.write_overlay", stop)
+        patch.setattr("mien.report.track_overlay.write_overlay", stop)
         with pytest.raises(KeyboardInterrupt):
             track_video(clip, head(), files)
     tracked = track_video(clip, head(), files, resume=True)
