@@ -1,0 +1,73 @@
+"""Principal components of a few rows of many numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Float, check_array, frozen
+from mien.errors import InputError
+
+__all__ = ["Pca", "fit_pca"]
+
+_RANK_TOLERANCE = 1e-10
+"""Deviations below this part of the greatest are rounding errors."""
+
+
+@dataclass(frozen=True)
+class Pca:
+    """The affine subspace in which rows vary most.
+
+    Attributes:
+        mean: (D,) where the subspace lies.
+        components: (C, D) orthonormal, the one of greatest variance first.
+        deviations: (C,) standard deviations of the rows along the components.
+        residual: standard deviation per number of what the components leave; 0 when they leave
+            nothing.
+    """
+
+    mean: Float[Array, " d"]
+    components: Float[Array, "c d"]
+    deviations: Float[Array, " c"]
+    residual: float
+
+    def coefficients(self, rows: Float[Array, "*n d"]) -> Float[Array, "*n c"]:
+        """Where the points of the subspace nearest to the rows are, along its components."""
+        along: Array = (rows - self.mean) @ self.components.T
+        return along
+
+    def project(self, rows: Float[Array, "*n d"]) -> Float[Array, "*n d"]:
+        """The points of the subspace nearest to the rows."""
+        nearest: Array = self.mean + self.coefficients(rows) @ self.components
+        return nearest
+
+
+def fit_pca(rows: Float[Array, "n d"], count: int, *, centred: bool = True) -> Pca:
+    """The first principal components of the rows.
+
+    Args:
+        rows: (N, D), N >= 1; 2 or more when centred.
+        count: how many components, at least 1; fewer come where the rows do not span so many.
+        centred: measure variation about the mean; otherwise about 0, so that the subspace
+            contains 0.
+    Raises: InputError: shape, NaN, too few rows, a count below 1.
+    """
+    rows = check_array("rows", rows, (None, None))
+    if len(rows) < 1 + centred:
+        raise InputError("rows", f"at least {1 + centred}", len(rows))
+    if count < 1:
+        raise InputError("count", "a number from 1 on", count)
+    mean = rows.mean(axis=0) if centred else np.zeros(rows.shape[1])
+    _, singular, components = np.linalg.svd(rows - mean, full_matrices=False)
+    freedom = len(rows) - centred
+    rank = int(np.count_nonzero(singular > _RANK_TOLERANCE * max(singular[0], np.abs(rows).max())))
+    kept = min(count, rank)
+    left = rows.shape[1] - kept
+    variance = float((singular[kept:rank] ** 2).sum()) / freedom / max(left, 1)
+    return Pca(
+        frozen(mean),
+        frozen(components[:kept]),
+        frozen(singular[:kept] / np.sqrt(freedom)),
+        float(np.sqrt(variance)),
+    )

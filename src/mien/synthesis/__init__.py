@@ -1,0 +1,1 @@
+"""Expressions from feature points: examples mixed by geometry (Z06)."""

@@ -1,0 +1,89 @@
+"""Head motion estimated and undone (Z06 sec. 12)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mien.errors import EstimationError, InputError
+from mien.synthesis.motion import PlanarMotion, compensated, estimate_planar_motion
+
+TRUE = PlanarMotion(np.array(1.1), np.array(-0.3), np.array([40.0, -12.0]))
+
+
+@pytest.fixture
+def neutral(rng):
+    return 300 + 80 * rng.normal(size=(20, 2))
+
+
+def test_recovers_a_known_motion(neutral):
+    found = estimate_planar_motion(neutral, TRUE(neutral))
+    assert (found.a, found.b) == (pytest.approx(1.1), pytest.approx(-0.3))
+    np.testing.assert_allclose(found.translation, TRUE.translation)
+    assert found.scale == pytest.approx(np.hypot(1.1, 0.3))
+
+
+def test_a_moved_neutral_face_is_the_neutral_face(neutral):
+    geometry, _ = compensated(TRUE(neutral), neutral)
+    np.testing.assert_allclose(geometry, neutral)
+
+
+def test_undo_undoes(rng, neutral):
+    points = rng.normal(size=(20, 2))
+    np.testing.assert_allclose(TRUE.undo(TRUE(points)), points, atol=1e-12)
+
+
+def test_any_other_motion_is_further_off(rng, neutral):
+    target = TRUE(neutral) + rng.normal(size=neutral.shape)
+    found = estimate_planar_motion(neutral, target)
+    best = np.sum((found(neutral) - target) ** 2)
+    for nudge in 1e-3 * np.concatenate([np.eye(4), -np.eye(4)]):
+        moved = PlanarMotion(found.a + nudge[0], found.b + nudge[1], found.translation + nudge[2:])
+        assert np.sum((moved(neutral) - target) ** 2) > best
+
+
+def test_expressions_that_no_motion_explains_stay(rng, neutral):
+    centred = neutral - neutral.mean(axis=0)
+    # What no translation, rotation or scale changes: orthogonal to all four.
+    turned = centred[:, ::-1] * [-1, 1]
+    rigid = [np.tile([1.0, 0], (20, 1)), np.tile([0, 1.0], (20, 1)), centred, turned]
+    basis = np.linalg.qr(np.stack([part.ravel() for part in rigid], axis=1))[0]
+    change = rng.normal(size=40)
+    expression = neutral + (change - basis @ (basis.T @ change)).reshape(20, 2)
+    geometry, _ = compensated(TRUE(expression), neutral)
+    np.testing.assert_allclose(geometry, expression)
+
+
+def test_a_batch_is_its_parts(rng, neutral):
+    points = TRUE(neutral) + rng.normal(size=(3, 2, 20, 2))
+    geometries, motion = compensated(points, neutral)
+    assert geometries.shape == points.shape
+    assert motion.a.shape == (3, 2)
+    np.testing.assert_allclose(geometries[2, 1], compensated(points[2, 1], neutral)[0])
+    np.testing.assert_allclose(motion(geometries), points)
+
+
+def test_two_points_suffice(neutral):
+    geometry, _ = compensated(TRUE(neutral[:2]), neutral[:2])
+    np.testing.assert_allclose(geometry, neutral[:2])
+
+
+@pytest.mark.parametrize(
+    ("points", "neutral", "message"),
+    [
+        (np.zeros((1, 2)), np.zeros((1, 2)), "source: expected at least 2 points, got 1"),
+        (np.zeros((4, 2)), np.ones((5, 2)), "target: expected shape"),
+        (np.full((5, 2), np.nan), np.ones((5, 2)), "target: expected finite numbers"),
+        (np.ones((5, 2)), np.full((5, 2), np.inf), "source: expected finite numbers"),
+    ],
+)
+def test_bad_input_is_named(points, neutral, message):
+    with pytest.raises(InputError, match=message):
+        compensated(points, neutral)
+
+
+def test_points_in_one_place_tell_of_no_motion(neutral):
+    with pytest.raises(EstimationError, match="those at rest share a place"):
+        compensated(neutral, np.full((20, 2), 7.0))
+    with pytest.raises(EstimationError, match="those that moved share a place"):
+        compensated(np.full((20, 2), 7.0), neutral)
