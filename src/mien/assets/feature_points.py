@@ -1,0 +1,238 @@
+"""The feature points that expressions are synthesised from: names, sets, triangles."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from mien.arrays import Array, Float, Int, check_array, frozen
+from mien.errors import FileFormatError, InputError
+
+__all__ = ["FeatureLayout", "load_feature_layout"]
+
+LANDMARK_COUNT = 478
+FORMAT, VERSION = "mien feature points", 1
+
+_KINDS: dict[type, str] = {str: "text", int: "a whole number", list: "a list", dict: "an object"}
+_Kind = TypeVar("_Kind")
+
+
+@dataclass(frozen=True)
+class FeatureLayout:
+    """What feature points there are on a face (Z06 section 5.1, Fig. 2a) and what is drawn on them.
+
+    Attributes:
+        name: "zhang134".
+        names: of the points; right and left are the subject's.
+        sets: of each level, the indices of each set's points (Z06 section 10, Fig. 4).
+        set_names: likewise.
+        mirror: (n,) each point's counterpart on the other side, its own on the midline.
+        template: (n, 2) on a mean face from the front, mouth open; its width is 1, y down, x to
+            the subject's left.
+        triangles: (T, 3) over the points and, after them, those of `frame`; none is folded over
+            on the template.
+        mixes: (n, 478) each point from the detector's landmarks; rows sum to 1.
+        rigid: points that move with the head alone (Z06 section 12.1).
+        surround: (k, 2) the points of `frame` on the template.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    sets: tuple[tuple[Int[Array, " s"], ...], ...]
+    set_names: tuple[tuple[str, ...], ...]
+    mirror: Int[Array, " n"]
+    template: Float[Array, "n 2"]
+    triangles: Int[Array, "t 3"]
+    mixes: Float[Array, "n 478"]
+    rigid: Int[Array, " r"]
+    surround: Float[Array, "k 2"]
+
+    @cached_property
+    def _indices(self) -> dict[str, int]:
+        return {name: index for index, name in enumerate(self.names)}
+
+    def index(self, name: str) -> int:
+        """The index of a point.
+
+        Raises: InputError: no point has this name; lists those that are close.
+        """
+        if name not in self._indices:
+            close = difflib.get_close_matches(name, self.names, n=3)
+            expected = f"a point of {self.name}"
+            raise InputError(
+                "feature point", expected + (f" such as {', '.join(close)}" if close else ""), name
+            )
+        return self._indices[name]
+
+    def from_landmarks(self, landmarks: Float[Array, "478 2"]) -> Float[Array, "n 2"]:
+        """The points on a face whose landmarks the detector found, in the same pixels.
+
+        Raises: InputError: shape, NaN.
+        """
+        points: Array = self.mixes @ check_array("landmarks", landmarks, (LANDMARK_COUNT, 2))
+        return points
+
+    def frame(self, points: Float[Array, "n 2"]) -> Float[Array, "k 2"]:
+        """Points around the face that follow the head and no expression, in the same pixels.
+
+        Raises: InputError: shape, NaN.
+        Source: Z06 section 12, eq. (8) and (9), over the rigid points.
+        """
+        points = check_array("points", points, (len(self.names), 2))
+        source, target = _complex(self.template[self.rigid]), _complex(points[self.rigid])
+        from_mean = source - source.mean()
+        scale = np.vdot(from_mean, target) / np.vdot(from_mean, from_mean)
+        placed = target.mean() + scale * (_complex(self.surround) - source.mean())
+        return np.column_stack([placed.real, placed.imag])
+
+
+def _complex(points: Float[Array, "n 2"]) -> Array:
+    """Points of the plane as numbers: a similarity is then a product and a sum."""
+    numbers: Array = points[:, 0] + 1j * points[:, 1]
+    return numbers
+
+
+def load_feature_layout(path: str | Path | None = None) -> FeatureLayout:
+    """The 134 points that ship with mien, or those of a file of the same kind.
+
+    Raises: InputError: the file cannot be read. FileFormatError: it holds no layout; says where.
+    """
+    path = Path(path or str(files("mien.assets") / "data" / "zhang134.json"))
+    try:
+        document = json.loads(path.read_bytes().decode("utf-8"))
+    except OSError as error:
+        raise InputError(path, "a readable file", error.strerror or error) from None
+    except (ValueError, RecursionError):
+        raise FileFormatError(path, "expected JSON in UTF-8") from None
+    try:
+        return _layout(document)
+    except _Broken as broken:
+        raise FileFormatError(path, broken.problem, broken.place) from None
+
+
+class _Broken(Exception):
+    def __init__(self, place: str, problem: str) -> None:
+        self.place, self.problem = place, problem
+
+
+def _layout(document: Any) -> FeatureLayout:
+    if _need(document, "format", str) != FORMAT:
+        raise _Broken("format", f"expected {FORMAT!r}, found {document['format'][:40]!r}")
+    if _need(document, "version", int) != VERSION:
+        problem = f"expected {VERSION}, found {document['version']}: written by a newer mien"
+        raise _Broken("version", problem)
+    points = _need(document, "points", list)
+    names = tuple(_need(p, "name", str, f"points[{i}]") for i, p in enumerate(points))
+    for name in names:
+        if names.count(name) > 1:
+            raise _Broken("points", f"{name!r} appears twice")
+    surround = _places(_need(document, "frame", list), "frame")
+    sets = _sets(_need(document, "sets", list), names)
+    return FeatureLayout(
+        name=_need(document, "name", str),
+        names=names,
+        sets=tuple(tuple(level.values()) for level in sets),
+        set_names=tuple(tuple(level) for level in sets),
+        mirror=_mirror(points, names),
+        template=_places([_need(p, "template", list, p["name"]) for p in points], "template"),
+        triangles=_triangles(_need(document, "triangles", list), len(names) + len(surround)),
+        mixes=_mixes(points),
+        rigid=_rigid(_need(document, "rigid", list), names),
+        surround=surround,
+    )
+
+
+def _need(data: Any, key: str, kind: type[_Kind], place: str = "") -> _Kind:
+    where = f"{place}.{key}" if place else key
+    if not isinstance(data, dict):
+        raise _Broken(place, f"expected an object with {key!r}, found {str(data)[:40]!r}")
+    if not isinstance(data.get(key), kind):
+        found = repr(data[key])[:40] if key in data else "nothing"
+        raise _Broken(where, f"expected {_KINDS[kind]}, found {found}")
+    value: _Kind = data[key]
+    return value
+
+
+def _indices(members: Any, names: tuple[str, ...], place: str) -> Int[Array, " s"]:
+    """The points of these names."""
+    if not isinstance(members, list) or not members:
+        raise _Broken(place, "expected a list of points")
+    for member in members:
+        if member not in names:
+            raise _Broken(place, f"unknown point {str(member)[:40]!r}")
+    return frozen(np.array([names.index(member) for member in members]))
+
+
+def _sets(levels: list[Any], names: tuple[str, ...]) -> list[dict[str, Int[Array, " s"]]]:
+    """Levels of sets that hold every point and hang together, so that all is reached from any."""
+    found = []
+    for number, level in enumerate(levels):
+        if not isinstance(level, dict):
+            raise _Broken(f"sets[{number}]", "expected an object of lists of points")
+        found.append({k: _indices(v, names, f"sets[{number}].{k}") for k, v in level.items()})
+    for number, level in enumerate(found):
+        for name, members in level.items():
+            near = [s for other in found[max(number - 1, 0) : number] for s in other.values()]
+            if number and not any(np.isin(members, other).any() for other in near):
+                raise _Broken(f"sets[{number}].{name}", "shares no point with the level above")
+    held = {int(i) for level in found for members in level.values() for i in members}
+    if missing := [name for i, name in enumerate(names) if i not in held]:
+        raise _Broken("sets", f"{missing[0]!r} belongs to none")
+    return found
+
+
+def _rigid(members: list[Any], names: tuple[str, ...]) -> Int[Array, " r"]:
+    indices = _indices(members, names, "rigid")
+    if len(indices) < 2:
+        raise _Broken("rigid", "expected at least 2 points")
+    return indices
+
+
+def _places(rows: list[Any], place: str) -> Float[Array, "n 2"]:
+    try:
+        return frozen(check_array(place, rows, (None, 2)))
+    except InputError as error:
+        raise _Broken(place, f"expected {error.expected}, found {error.got}") from None
+
+
+def _mirror(points: list[Any], names: tuple[str, ...]) -> Int[Array, " n"]:
+    partners = [_need(p, "mirror", str, p["name"]) for p in points]
+    mirror = _indices(partners, names, "mirror")
+    for index, name in enumerate(names):
+        if mirror[mirror[index]] != index:
+            problem = f"its counterpart {partners[index]!r} has another one"
+            raise _Broken(f"{name}.mirror", problem)
+    return mirror
+
+
+def _triangles(rows: list[Any], count: int) -> Int[Array, "t 3"]:
+    triangles = np.array(rows) if all(_is_triple(row) for row in rows) else None
+    if triangles is None or not len(rows) or triangles.min() < 0 or triangles.max() >= count:
+        raise _Broken("triangles", f"expected triples of whole numbers from 0 to {count - 1}")
+    return frozen(triangles)
+
+
+def _is_triple(row: Any) -> bool:
+    return isinstance(row, list) and len(row) == 3 and all(type(entry) is int for entry in row)
+
+
+def _mixes(points: list[Any]) -> Float[Array, "n 478"]:
+    mixes = np.zeros((len(points), LANDMARK_COUNT))
+    for row, point in zip(mixes, points, strict=True):
+        place = f"{point['name']}.landmarks"
+        for landmark, share in _need(point, "landmarks", dict, point["name"]).items():
+            if not landmark.isdecimal() or int(landmark) >= LANDMARK_COUNT:
+                raise _Broken(place, f"expected landmarks 0 to 477, found {landmark[:40]!r}")
+            if not isinstance(share, int | float):
+                raise _Broken(place, f"expected a number, found {str(share)[:40]!r}")
+            row[int(landmark)] = share
+        if not abs(row.sum() - 1) < 1e-6:
+            raise _Broken(place, f"expected shares that sum to 1, found {row.sum():g}")
+    return frozen(mixes)
