@@ -60,14 +60,14 @@ def test_about_zero_the_subspace_contains_zero(rng):
 
 
 @pytest.mark.parametrize(
-    ("rows", "count", "message"),
+    ("rows", "components", "message"),
     [
         (np.full((3, 2), np.nan), 1, "rows: expected finite numbers"),
         (np.zeros(4), 1, "rows: expected shape"),
         (np.zeros((1, 4)), 1, "rows: expected at least 2, got 1"),
-        (np.zeros((3, 4)), 0, "count: expected a number from 1 on, got 0"),
+        (np.zeros((3, 4)), 0, "components: expected a number from 1 on, got 0"),
     ],
 )
-def test_bad_input_is_named(rows, count, message):
+def test_bad_input_is_named(rows, components, message):
     with pytest.raises(InputError, match=message):
-        fit_pca(rows, count)
+        fit_pca(rows, components)

@@ -43,31 +43,31 @@ class Pca:
         return nearest
 
 
-def fit_pca(rows: Float[Array, "n d"], count: int, *, centred: bool = True) -> Pca:
+def fit_pca(rows: Float[Array, "n d"], components: int, *, centred: bool = True) -> Pca:
     """The first principal components of the rows.
 
     Args:
         rows: (N, D), N >= 1; 2 or more when centred.
-        count: how many components, at least 1; fewer come where the rows do not span so many.
+        components: how many, at least 1; fewer come where the rows do not span so many.
         centred: measure variation about the mean; otherwise about 0, so that the subspace
             contains 0.
-    Raises: InputError: shape, NaN, too few rows, a count below 1.
+    Raises: InputError: shape, NaN, too few rows, fewer than 1 component.
     """
     rows = check_array("rows", rows, (None, None))
     if len(rows) < 1 + centred:
         raise InputError("rows", f"at least {1 + centred}", len(rows))
-    if count < 1:
-        raise InputError("count", "a number from 1 on", count)
+    if components < 1:
+        raise InputError("components", "a number from 1 on", components)
     mean = rows.mean(axis=0) if centred else np.zeros(rows.shape[1])
-    _, singular, components = np.linalg.svd(rows - mean, full_matrices=False)
+    _, singular, directions = np.linalg.svd(rows - mean, full_matrices=False)
     freedom = len(rows) - centred
     rank = int(np.count_nonzero(singular > _RANK_TOLERANCE * max(singular[0], np.abs(rows).max())))
-    kept = min(count, rank)
+    kept = min(components, rank)
     left = rows.shape[1] - kept
     variance = float((singular[kept:rank] ** 2).sum()) / freedom / max(left, 1)
     return Pca(
         frozen(mean),
-        frozen(components[:kept]),
+        frozen(directions[:kept]),
         frozen(singular[:kept] / np.sqrt(freedom)),
         float(np.sqrt(variance)),
     )
