@@ -167,7 +167,7 @@ def _set(*keys: str | int, to: Any) -> Callable[[Any], None]:
         (_set("points", 8, "mirror", to="nose"), "mirror: unknown point 'nose'"),
         (_set("points", 8, "mirror", to="chin"), "right_eye_inner.mirror: its counterpart 'chin'"),
         (_set("points", 3, "template", to=[1]), "template: expected numbers of shape"),
-        (_set("points", 8, "landmarks", to={"478": 1}), "landmarks 0 to 477, found '478'"),
+        (_set("points", 8, "landmarks", to={"478": 1}), "landmarks: unknown point '478'"),
         (
             _set("points", 8, "landmarks", to={"4": "x"}),
             "right_eye_inner.landmarks: expected a num",

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import difflib
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array, frozen
-from mien.errors import FileFormatError, InputError
+from mien.assets.data_file import Broken, need, read_data, shares
+from mien.errors import InputError
 
 __all__ = ["FeatureLayout", "load_feature_layout"]
 
 LANDMARK_COUNT = 478
-FORMAT, VERSION = "mien feature points", 1
-
-_KINDS: dict[type, str] = {str: "text", int: "a whole number", list: "a list", dict: "an object"}
-_Kind = TypeVar("_Kind")
+FORMAT = "mien feature points"
 
 
 @dataclass(frozen=True)
@@ -104,69 +101,39 @@ def load_feature_layout(path: str | Path | None = None) -> FeatureLayout:
 
     Raises: InputError: the file cannot be read. FileFormatError: it holds no layout; says where.
     """
-    path = Path(path or str(files("mien.assets") / "data" / "zhang134.json"))
-    try:
-        document = json.loads(path.read_bytes().decode("utf-8"))
-    except OSError as error:
-        raise InputError(path, "a readable file", error.strerror or error) from None
-    except (ValueError, RecursionError):
-        raise FileFormatError(path, "expected JSON in UTF-8") from None
-    try:
-        return _layout(document)
-    except _Broken as broken:
-        raise FileFormatError(path, broken.problem, broken.place) from None
+    shipped = str(files("mien.assets") / "data" / "zhang134.json")
+    return read_data(Path(path or shipped), FORMAT, _layout)
 
 
-class _Broken(Exception):
-    def __init__(self, place: str, problem: str) -> None:
-        self.place, self.problem = place, problem
-
-
-def _layout(document: Any) -> FeatureLayout:
-    if _need(document, "format", str) != FORMAT:
-        raise _Broken("format", f"expected {FORMAT!r}, found {document['format'][:40]!r}")
-    if _need(document, "version", int) != VERSION:
-        problem = f"expected {VERSION}, found {document['version']}: written by a newer mien"
-        raise _Broken("version", problem)
-    points = _need(document, "points", list)
-    names = tuple(_need(p, "name", str, f"points[{i}]") for i, p in enumerate(points))
+def _layout(document: dict[str, Any]) -> FeatureLayout:
+    points = need(document, "points", list)
+    names = tuple(need(p, "name", str, f"points[{i}]") for i, p in enumerate(points))
     for name in names:
         if names.count(name) > 1:
-            raise _Broken("points", f"{name!r} appears twice")
-    surround = _places(_need(document, "frame", list), "frame")
-    sets = _sets(_need(document, "sets", list), names)
+            raise Broken("points", f"{name!r} appears twice")
+    surround = _places(need(document, "frame", list), "frame")
+    sets = _sets(need(document, "sets", list), names)
     return FeatureLayout(
-        name=_need(document, "name", str),
+        name=need(document, "name", str),
         names=names,
         sets=tuple(tuple(level.values()) for level in sets),
         set_names=tuple(tuple(level) for level in sets),
         mirror=_mirror(points, names),
-        template=_places([_need(p, "template", list, p["name"]) for p in points], "template"),
-        triangles=_triangles(_need(document, "triangles", list), len(names) + len(surround)),
+        template=_places([need(p, "template", list, p["name"]) for p in points], "template"),
+        triangles=_triangles(need(document, "triangles", list), len(names) + len(surround)),
         mixes=_mixes(points),
-        rigid=_rigid(_need(document, "rigid", list), names),
+        rigid=_rigid(need(document, "rigid", list), names),
         surround=surround,
     )
-
-
-def _need(data: Any, key: str, kind: type[_Kind], place: str = "") -> _Kind:
-    where = f"{place}.{key}" if place else key
-    if not isinstance(data, dict):
-        raise _Broken(place, f"expected an object with {key!r}, found {str(data)[:40]!r}")
-    if not isinstance(data.get(key), kind):
-        found = repr(data[key])[:40] if key in data else "nothing"
-        raise _Broken(where, f"expected {_KINDS[kind]}, found {found}")
-    value: _Kind = data[key]
-    return value
 
 
 def _indices(members: Any, names: tuple[str, ...], place: str) -> Int[Array, " s"]:
     """The points of these names."""
     if not isinstance(members, list) or not members:
-        raise _Broken(place, "expected a list of points")
+        raise Broken(place, "expected a list of points")
     for member in members:
         if member not in names:
-            raise _Broken(place, f"unknown point {str(member)[:40]!r}")
+            raise Broken(place, f"unknown point {str(member)[:40]!r}")
     return frozen(np.array([names.index(member) for member in members]))
 
 
@@ -175,23 +142,23 @@ def _sets(levels: list[Any], names: tuple[str, ...]) -> list[dict[str, Int[Array
     found = []
     for number, level in enumerate(levels):
         if not isinstance(level, dict):
-            raise _Broken(f"sets[{number}]", "expected an object of lists of points")
+            raise Broken(f"sets[{number}]", "expected an object of lists of points")
         found.append({k: _indices(v, names, f"sets[{number}].{k}") for k, v in level.items()})
     for number, level in enumerate(found):
         for name, members in level.items():
             near = [s for other in found[max(number - 1, 0) : number] for s in other.values()]
             if number and not any(np.isin(members, other).any() for other in near):
-                raise _Broken(f"sets[{number}].{name}", "shares no point with the level above")
+                raise Broken(f"sets[{number}].{name}", "shares no point with the level above")
     held = {int(i) for level in found for members in level.values() for i in members}
     if missing := [name for i, name in enumerate(names) if i not in held]:
-        raise _Broken("sets", f"{missing[0]!r} belongs to none")
+        raise Broken("sets", f"{missing[0]!r} belongs to none")
     return found
 
 
 def _rigid(members: list[Any], names: tuple[str, ...]) -> Int[Array, " r"]:
     indices = _indices(members, names, "rigid")
     if len(indices) < 2:
-        raise _Broken("rigid", "expected at least 2 points")
+        raise Broken("rigid", "expected at least 2 points")
     return indices
 
 
@@ -199,23 +166,23 @@ def _places(rows: list[Any], place: str) -> Float[Array, "n 2"]:
     try:
         return frozen(check_array(place, rows, (None, 2)))
     except InputError as error:
-        raise _Broken(place, f"expected {error.expected}, found {error.got}") from None
+        raise Broken(place, f"expected {error.expected}, found {error.got}") from None
 
 
 def _mirror(points: list[Any], names: tuple[str, ...]) -> Int[Array, " n"]:
-    partners = [_need(p, "mirror", str, p["name"]) for p in points]
+    partners = [need(p, "mirror", str, p["name"]) for p in points]
     mirror = _indices(partners, names, "mirror")
     for index, name in enumerate(names):
         if mirror[mirror[index]] != index:
             problem = f"its counterpart {partners[index]!r} has another one"
-            raise _Broken(f"{name}.mirror", problem)
+            raise Broken(f"{name}.mirror", problem)
     return mirror
 
 
 def _triangles(rows: list[Any], count: int) -> Int[Array, "t 3"]:
     triangles = np.array(rows) if all(_is_triple(row) for row in rows) else None
     if triangles is None or not len(rows) or triangles.min() < 0 or triangles.max() >= count:
-        raise _Broken("triangles", f"expected triples of whole numbers from 0 to {count - 1}")
+        raise Broken("triangles", f"expected triples of whole numbers from 0 to {count - 1}")
     return frozen(triangles)
 
 
@@ -227,12 +194,10 @@ def _mixes(points: list[Any]) -> Float[Array, "n 478"]:
     mixes = np.zeros((len(points), LANDMARK_COUNT))
     for row, point in zip(mixes, points, strict=True):
         place = f"{point['name']}.landmarks"
-        for landmark, share in _need(point, "landmarks", dict, point["name"]).items():
-            if not landmark.isdecimal() or int(landmark) >= LANDMARK_COUNT:
-                raise _Broken(place, f"expected landmarks 0 to 477, found {landmark[:40]!r}")
-            if not isinstance(share, int | float):
-                raise _Broken(place, f"expected a number, found {str(share)[:40]!r}")
-            row[int(landmark)] = share
-        if not abs(row.sum() - 1) < 1e-6:
-            raise _Broken(place, f"expected shares that sum to 1, found {row.sum():g}")
+        found = shares(need(point, "landmarks", dict, point["name"]), _landmark, place)
+        row[list(found)] = list(found.values())
     return frozen(mixes)
+
+
+def _landmark(number: str) -> int | None:
+    return int(number) if number.isdecimal() and int(number) < LANDMARK_COUNT else None

@@ -1,0 +1,219 @@
+"""The 14 subregions that a face is synthesised in, drawn as polygons of its feature points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mien.arrays import Array, Bool, Float, Int, check_array, frozen
+from mien.assets.data_file import Broken, need, read_data, shares
+from mien.assets.feature_points import FeatureLayout
+from mien.errors import InputError
+
+__all__ = ["SubregionDrawing", "Subregions", "default_subregions", "load_subregion_drawing"]
+
+FORMAT = "mien subregions"
+OUTER_FADE = 1.0
+"""The face fades out over this many widths of a blend: hair and jaw need a soft end."""
+
+_TEMPLATE_WIDTH_PX = 600
+
+
+@dataclass(frozen=True)
+class SubregionDrawing:
+    """Subregions over a layout, whosever face it is on. Later ones are painted over earlier ones.
+
+    Attributes:
+        names: of the subregions.
+        groups: within a group, neighbours blend; between groups borders are hard.
+        corners: of each polygon, (c, n + k): mixes of the layout's points and its frame's.
+        blends: width of the blend along each one's borders, in widths of the face; one a group.
+    """
+
+    names: tuple[str, ...]
+    groups: tuple[str, ...]
+    corners: tuple[Float[Array, "c points"], ...]
+    blends: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Subregions:
+    """The subregions on a person's standard image (Z06 section 5.3, Fig. 2b).
+
+    Attributes:
+        names: R of them, teeth last.
+        fades: (h, w, R) float32, each pixel's shares; they sum to 1 inside of the face and fall
+            to 0 around it.
+        members: of each, the indices of the feature points within it or on its boundary.
+    """
+
+    names: tuple[str, ...]
+    fades: Float[Array, "h w r"]
+    members: tuple[Int[Array, " m"], ...]
+
+
+def default_subregions(
+    layout: FeatureLayout,
+    standard_points: Float[Array, "n 2"],
+    size: tuple[int, int],
+    *,
+    drawing: SubregionDrawing | None = None,
+) -> Subregions:
+    """The subregions over a person's standard image.
+
+    Args:
+        standard_points: (n, 2) px of the standard image.
+        size: its width and height.
+        drawing: another one than mien's own.
+    Raises: InputError: shapes, NaN, no pixels.
+    Source: Z06 sections 5.3 and 7, eq. (7), Fig. 3b.
+    """
+    points = check_array("standard_points", standard_points, (len(layout.names), 2))
+    if min(size) < 1:
+        raise InputError("size", "a width and height of at least 1", size)
+    drawing = drawing or load_subregion_drawing(layout)
+    return Subregions(
+        names=drawing.names,
+        fades=frozen(_fades(layout, drawing, points, size)),
+        members=_members(layout, drawing),
+    )
+
+
+def _fades(
+    layout: FeatureLayout, drawing: SubregionDrawing, points: Array, size: tuple[int, int]
+) -> Float[Array, "h w r"]:
+    """Shares by eq. (7): linear across a border, half on it; none across hard borders."""
+    labels = _painted(layout, drawing, points, size)
+    widths = np.array(drawing.blends) * float(np.ptp(points[:, 0]))
+    groups = np.array([sorted(set(drawing.groups)).index(group) for group in drawing.groups])
+    fades = np.zeros((*labels.shape, len(drawing.names)), np.float32)
+    # Off the face, every pixel goes on with the group of the skin.
+    group_of = np.where(labels >= 0, groups[labels], groups[0])
+    for region, group in enumerate(groups):
+        inside, kin = labels == region, np.isin(labels, np.flatnonzero(groups == group))
+        depth = _distance_to(kin & ~inside) - _distance_to(inside)
+        depth -= 0.5 * np.sign(depth)  # Borders run between the centres of pixels.
+        fades[..., region] = np.clip(0.5 + depth / widths[region], 0, 1) * (group_of == group)
+    fades /= fades.sum(axis=2, keepdims=True)
+    outside = np.maximum(_distance_to(labels >= 0) - 0.5, 0)
+    fades *= np.clip(1 - outside / (OUTER_FADE * widths[0]), 0, 1)[..., None]
+    return fades
+
+
+def _painted(
+    layout: FeatureLayout, drawing: SubregionDrawing, points: Array, size: tuple[int, int]
+) -> Int[Array, "h w"]:
+    """Each pixel's subregion, -1 off the face."""
+    import cv2
+
+    places = np.vstack([points, layout.frame(points)])
+    labels = np.full((size[1], size[0]), -1, np.int16)
+    for region, corners in enumerate(drawing.corners):
+        # Sixteenths of a pixel, counted from the centre of the first one.
+        polygon = np.round((corners @ places - 0.5) * 16).astype(np.int32)
+        cv2.fillPoly(labels, [polygon], region, shift=4)
+    return labels
+
+
+def _distance_to(mask: Bool[Array, "h w"]) -> Float[Array, "h w"]:
+    """From each pixel to the nearest one in the mask, in px; far off where there is none."""
+    import cv2
+
+    if not mask.any():
+        return np.full(mask.shape, 1e6, np.float32)
+    distances: Array = cv2.distanceTransform(
+        (~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
+    )
+    return distances
+
+
+def _members(layout: FeatureLayout, drawing: SubregionDrawing) -> tuple[Int[Array, " m"], ...]:
+    """Points within a subregion or where it blends, found on the template: the same for all."""
+    low = np.minimum(layout.template.min(axis=0), layout.surround.min(axis=0))
+    points = (layout.template - low) * _TEMPLATE_WIDTH_PX
+    size = np.ceil((layout.surround.max(axis=0) - low) * _TEMPLATE_WIDTH_PX).astype(int) + 1
+    labels = _painted(layout, drawing, points, (int(size[0]), int(size[1])))
+    columns, rows = np.floor(points).astype(int).T
+    members = []
+    for region, blend in enumerate(drawing.blends):
+        distances = _distance_to(labels == region)[rows, columns]
+        members.append(frozen(np.flatnonzero(distances <= blend / 2 * _TEMPLATE_WIDTH_PX)))
+    return tuple(members)
+
+
+def load_subregion_drawing(
+    layout: FeatureLayout, path: str | Path | None = None
+) -> SubregionDrawing:
+    """The 14 subregions that ship with mien, or those of a file of the same kind.
+
+    Raises: InputError: the file cannot be read. FileFormatError: no subregions over this layout.
+    """
+    shipped = str(files("mien.assets") / "data" / "zhang134_subregions.json")
+    return read_data(Path(path or shipped), FORMAT, lambda document: _drawing(document, layout))
+
+
+def _drawing(document: dict[str, Any], layout: FeatureLayout) -> SubregionDrawing:
+    if need(document, "layout", str) != layout.name:
+        problem = f"expected {layout.name!r}, found {document['layout'][:40]!r}"
+        raise Broken("layout", problem)
+    blends = {k: _width(v, f"groups.{k}") for k, v in need(document, "groups", dict).items()}
+    polygons: dict[str, Array] = {}
+    groups: dict[str, str] = {}
+    for number, region in enumerate(need(document, "regions", list)):
+        name = need(region, "name", str, f"regions[{number}]")
+        if name in polygons:
+            raise Broken(f"regions[{number}]", f"{name!r} appears twice")
+        if "mirror_of" in region:
+            original = need(region, "mirror_of", str, name)
+            if original not in polygons:
+                raise Broken(f"{name}.mirror_of", f"no subregion {original!r} before this one")
+            polygons[name] = _mirrored(polygons[original], layout)
+            groups[name] = region.get("group", groups[original])
+        else:
+            polygons[name] = _polygon(region, name, layout)
+            groups[name] = need(region, "group", str, name)
+        if groups[name] not in blends:
+            raise Broken(f"{name}.group", f"unknown group {str(groups[name])[:40]!r}")
+    if not polygons:
+        raise Broken("regions", "expected at least one")
+    return SubregionDrawing(
+        names=tuple(polygons),
+        groups=tuple(groups.values()),
+        corners=tuple(map(frozen, polygons.values())),
+        blends=tuple(blends[group] for group in groups.values()),
+    )
+
+
+def _width(value: Any, place: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1:
+        raise Broken(place, f"expected a number between 0 and 1, found {str(value)[:40]!r}")
+    return float(value)
+
+
+def _polygon(region: Any, name: str, layout: FeatureLayout) -> Float[Array, "c points"]:
+    frame = [f"frame.{i}" for i in range(len(layout.surround))]
+    index = {point: i for i, point in enumerate((*layout.names, *frame))}
+    corners = need(region, "corners", list, name)
+    polygon = np.zeros((len(corners), len(index)))
+    for number, (row, corner) in enumerate(zip(polygon, corners, strict=True)):
+        place = f"{name}.corners[{number}]"
+        if not isinstance(corner, dict):
+            raise Broken(place, "expected an object of shares by point")
+        found = shares(corner, index.get, place)
+        row[list(found)] = list(found.values())
+    if region.get("symmetric"):
+        polygon = np.vstack([polygon, _mirrored(polygon, layout)[::-1]])
+    if len(polygon) < 3:
+        raise Broken(f"{name}.corners", f"expected at least 3, found {len(polygon)}")
+    return polygon
+
+
+def _mirrored(polygon: Array, layout: FeatureLayout) -> Float[Array, "c points"]:
+    """The polygon on the other side of the face; the frame's first point is at its top."""
+    around = len(layout.surround)
+    mirror = np.append(layout.mirror, len(layout.names) + (-np.arange(around)) % around)
+    return polygon[:, mirror]
