@@ -57,7 +57,7 @@ def test_propagation_in_one_set_with_prior_comes_to_the_same(rng):
     one = SimpleNamespace(sets=LAYOUT.sets[:1])
     patient = {"threshold": 1e-9, "max_iterations": 3000}
     expected = ConditionalMotion(statistics, components=5).infer(KNOWN, given)
-    for trust in (1.0, 10.0):
+    for trust in (0.0, 10.0):
         propagation = Propagation(one, statistics, components=5, trust=trust, prior=1, **patient)
         found = propagation.infer(KNOWN, given)
         np.testing.assert_allclose(found.displacements, expected.displacements, atol=1e-5)

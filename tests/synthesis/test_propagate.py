@@ -79,6 +79,16 @@ def test_points_nearly_trusted_alone_are_found_in_few_iterations(rng):
     assert np.abs(slower - truth).max() > 1
 
 
+def test_trust_changes_nothing_where_all_points_are_known(rng):
+    statistics = expressions(rng, 6, noise=0.5)
+    given = 3 * statistics[0]
+    found = [
+        Propagation(LAYOUT, statistics, components=3, trust=trust).infer(np.arange(POINTS), given)
+        for trust in (0.0, 1.0)
+    ]
+    np.testing.assert_allclose(found[0].displacements, found[1].displacements)
+
+
 def test_a_prior_keeps_nearer_to_what_is_usual(rng):
     statistics = expressions(rng, noise=1.0)
     given = 5 * statistics[0, KNOWN]
@@ -193,7 +203,7 @@ def test_points_in_no_set_tell_nothing(rng):
     [
         ({"components": 0}, "components: expected a number from 1 on"),
         ({"components": (3, 3)}, "components: expected one number, or 3"),
-        ({"trust": 0}, "trust: expected a number above zero"),
+        ({"trust": -1}, "trust: expected a number of 0 or more"),
         ({"prior": -1}, "prior: expected a number of 0 or more"),
         ({"prior": np.nan}, "prior: expected finite numbers"),
         ({"threshold": 0}, "threshold: expected a number above zero"),

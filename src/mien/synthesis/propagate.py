@@ -42,9 +42,9 @@ class Propagation:
             person, head motion compensated; N >= 2.
         components: how many principal components the sets keep: one number, or one for each
             hierarchy.
-        trust: the weight of known points beside others when a set is projected; 1 is as printed.
-            With more, what was given lasts longer than what was guessed, and fewer iterations
-            are needed.
+        trust: what the known points of a set weigh together when it is projected, where all its
+            points at one each weigh 1, and none less than one; 0 is as printed. With more, what
+            was given lasts longer than what was guessed, and fewer iterations are needed.
         prior: the weight of how usual a displacement is, with what the components leave as the
             noise; 0 is as printed, 1 the most likely displacement for normally distributed ones.
             With it, more components do good where they overfit without.
@@ -64,7 +64,7 @@ class Propagation:
         statistics: Float[Array, "m n 2"],
         *,
         components: int | Sequence[int] = COMPONENTS,
-        trust: float = 1.0,
+        trust: float = 0.0,
         prior: float = 0.0,
         threshold: float = 1e-3,
         max_iterations: int = 50,
@@ -72,10 +72,8 @@ class Propagation:
         statistics = check_statistics(statistics)
         self._count = statistics.shape[1]
         self._sets = _check_sets(layout.sets, self._count)
-        self._trust = check_positive("trust", trust)
-        self._prior = float(check_array("prior", prior, ()))
-        if self._prior < 0:
-            raise InputError("prior", "a number of 0 or more", prior)
+        self._trust = _check_not_negative("trust", trust)
+        self._prior = _check_not_negative("prior", prior)
         self._threshold = check_positive("threshold", threshold)
         if max_iterations < 1:
             raise InputError("max_iterations", "a number from 1 on", max_iterations)
@@ -119,9 +117,11 @@ class Propagation:
         self, points: Int[Array, " s"], pca: Pca, given: Bool[Array, " n"]
     ) -> _Projection:
         """Least squares over the set, known points weighted, coefficients held by the prior."""
-        weighted = pca.components * np.repeat(np.where(given[points], self._trust, 1.0), 2)
+        known = np.count_nonzero(given[points])
+        weight = max(1.0, self._trust * len(points) / known) if known else 1.0
+        weighted = pca.components * np.repeat(np.where(given[points], weight, 1.0), 2)
         # Relative to the noise of known points, so that trust leaves their balance with the prior.
-        noise = self._trust * max(pca.residual, LEAST_NOISE) ** 2
+        noise = weight * max(pca.residual, LEAST_NOISE) ** 2
         held = np.diag(self._prior * noise / pca.deviations**2)
         gain = np.linalg.solve(weighted @ pca.components.T + held, weighted)
         return _Projection(points, pca.mean, gain, pca.components)
@@ -195,6 +195,13 @@ def _fitted(statistics: Array, sets: PointSets, components: int | Sequence[int])
         [fit_pca(statistics[:, points].reshape(len(statistics), -1), count) for points in level]
         for level, count in zip(sets, counts, strict=True)
     ]
+
+
+def _check_not_negative(name: str, value: float) -> float:
+    number = float(check_array(name, value, ()))
+    if number < 0:
+        raise InputError(name, "a number of 0 or more", value)
+    return number
 
 
 def _distance(found: Array, given: Array) -> float:
