@@ -44,19 +44,15 @@ class Way:
     backwards: bool = False
 
     def made(self, layout: FeatureLayout, clip: HeldOut, iterations: int) -> Inference:
-        """That learned from a clip, to be stopped after so many iterations and not before."""
+        """That learned from a clip, to be stopped after so many iterations if not before."""
         sets = layout.sets[: self.levels]
         if self.backwards:
             sets = tuple(level[::-1] for level in sets)
         options = dict(self.options)
-        if "components" not in options:
-            options["components"] = COMPONENTS[: self.levels]
+        options.setdefault("components", COMPONENTS[: self.levels])
+        options.setdefault("threshold", _TO_THE_END)
         return Propagation(
-            replace(layout, sets=sets),
-            clip.statistics,
-            threshold=_TO_THE_END,
-            max_iterations=iterations,
-            **options,
+            replace(layout, sets=sets), clip.statistics, max_iterations=iterations, **options
         )
 
 
@@ -166,6 +162,23 @@ def what_was_tried(layout: FeatureLayout, clips: Mapping[str, HeldOut]) -> str:
     return markdown_table(("17 points, 50 iterations", *clips), rows)
 
 
+def stop_rule(layout: FeatureLayout, clips: Mapping[str, HeldOut]) -> str:
+    """Iterations and errors by threshold."""
+    known, rows = known_points(layout, GIVEN), []
+    for way in (PRINTED, HELD):
+        for threshold in (1e-1, 1e-2, 1e-3, 1e-4):
+            stopping = replace(way, options={**way.options, "threshold": threshold})
+            row: list[object] = [f"{way.name}, {threshold:g} px"]
+            for clip in clips.values():
+                made = stopping.made(layout, clip, 500)
+                found = [made.infer(known, truth[known]) for truth in clip.truth]
+                row.append(float(np.mean([one.iterations for one in found])))
+                row.append(float(mean_errors(made, layout, clip, GIVEN)[0]))
+            rows.append(row)
+    header = [f"{name}: {what}" for name in clips for what in ("iterations", "px")]
+    return markdown_table(("17 points, threshold", *header), rows)
+
+
 def _both(
     made: Sequence[Inference], layout: FeatureLayout, clips: Mapping[str, HeldOut]
 ) -> list[float]:
@@ -226,6 +239,7 @@ def main() -> int:
     parts = [explanation(clips)]
     parts += ["## From 5 to 40 points", "Points that were not given.", by_count(layout, clips)]
     parts += ["## By iteration, from 17 points", iterations]
+    parts += ["## The stop rule", "Points that were not given.", stop_rule(layout, clips)]
     parts += ["## What was tried", "Points that were not given.", what_was_tried(layout, clips)]
     write_results("propagation", "All feature points from a few (Z06 sec. 10, Fig. 12)", parts)
     return 0
