@@ -1,0 +1,78 @@
+"""The mixture of columns that comes nearest to a target."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mien.arrays import Array, Float, check_array, frozen
+from mien.errors import EstimationError, InputError
+
+__all__ = ["simplex_least_squares"]
+
+_ACCURACY = 1e-11
+
+
+def simplex_least_squares(
+    columns: Float[Array, "d m"],
+    target: Float[Array, " d"],
+    *,
+    slack: float = 0.0,
+    penalty: Float[Array, " m"] | None = None,
+) -> Float[Array, " m"]:
+    """Shares c that minimise |columns c - target|^2 + penalty . c, found by an interior point.
+
+    Where several mixtures are equally near, as with columns that are the same, one of them.
+
+    Args:
+        columns: (d, m) what is mixed.
+        target: (d,).
+        slack: how far below 0 a share may go; above 0, the mixture may leave the convex hull.
+        penalty: (m,) cost of a column's share, in the square of the target's unit.
+    Returns: (m,) shares that sum to 1, none below -slack.
+    Raises: InputError: shapes, NaN, no column, a slack below 0. EstimationError: numbers so large
+        that the solver does not converge.
+    Source: Z06 section 6, eq. (2) to (5); slack and penalty are not the paper's.
+    """
+    columns = check_array("columns", columns, (None, None))
+    target = check_array("target", target, (len(columns),))
+    count = columns.shape[1]
+    if count == 0:
+        raise InputError("columns", "at least one", "none")
+    if not (np.isfinite(slack) and slack >= 0):
+        raise InputError("slack", "a number of at least 0", slack)
+    costs = np.zeros(count) if penalty is None else check_array("penalty", penalty, (count,))
+    # Shares sum to 1: the target taken from each column leaves the cost as it is, with smaller
+    # numbers than eq. (5)'s and none linear.
+    apart = columns - target[:, None]
+    squares = apart.T @ apart
+    scale = max(float(squares.diagonal().max()), float(np.abs(costs).max()))
+    if scale == 0.0:
+        return frozen(np.full(count, 1.0 / count))
+    if not np.isfinite(scale):
+        raise EstimationError("columns and target are too large to be squared")
+    return frozen(_solved(2.0 * squares / scale, costs / scale, slack))
+
+
+def _solved(quadratic: Array, linear: Array, slack: float) -> Float[Array, " m"]:
+    import piqp
+
+    count = len(linear)
+    solver = piqp.DenseSolver()
+    solver.settings.eps_abs = solver.settings.eps_duality_gap_abs = _ACCURACY
+    solver.settings.eps_rel = solver.settings.eps_duality_gap_rel = 0.0
+    solver.setup(
+        np.asfortranarray(quadratic),
+        linear,
+        np.ones((1, count), order="F"),
+        np.ones(1),
+        x_l=np.full(count, -slack),
+    )
+    status = solver.solve()
+    shares: Array = np.asarray(solver.result.x, np.float64).copy()
+    if status != piqp.PIQP_SOLVED and not np.isfinite(shares).all():
+        raise EstimationError(f"no nearest mixture was found: {status}")
+    # An interior point keeps off the bounds by its accuracy.
+    above = np.maximum(shares + slack, 0.0)
+    above[above < 1e-9] = 0.0
+    result: Array = above * ((1.0 + count * slack) / above.sum()) - slack
+    return result
