@@ -1,0 +1,113 @@
+"""Delineations: written and read back, and what they share with the feature points."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mien.assets.feature_points import load_feature_layout
+from mien.errors import FileFormatError, InputError
+from mien.formats.tem import (
+    Delineation,
+    TemLine,
+    points_from_tem,
+    points_to_tem,
+    read_tem,
+    write_tem,
+)
+
+SMALL = "3\n1.5\t2\n3 4\n5\t6\n2\n0\n2\n0 1\n1\n4\n0 1 2 0\n"
+
+
+def test_reads_points_and_lines(tmp_path: Path) -> None:
+    path = tmp_path / "a.tem"
+    path.write_text(SMALL)
+    found = read_tem(path)
+    np.testing.assert_array_equal(found.points, [[1.5, 2], [3, 4], [5, 6]])
+    assert [(line.closed, line.points.tolist()) for line in found.lines] == [
+        (False, [0, 1]),
+        (True, [0, 1, 2, 0]),
+    ]
+
+
+def test_a_file_without_lines_and_with_other_ends_of_line_reads(tmp_path: Path) -> None:
+    (tmp_path / "a.tem").write_bytes(b"\xef\xbb\xbf1\r\n7\t8\r\n")
+    found = read_tem(tmp_path / "a.tem")
+    np.testing.assert_array_equal(found.points, [[7, 8]])
+    assert found.lines == ()
+
+
+def test_a_layouts_points_come_back(tmp_path: Path, rng: np.random.Generator) -> None:
+    layout = load_feature_layout()
+    points = np.round(rng.uniform(0, 900, (134, 2)), 3)
+    write_tem(tmp_path / "a.tem", points_to_tem(layout, points))
+    found = read_tem(tmp_path / "a.tem")
+    named = points_from_tem(found, layout)
+    assert list(named) == list(layout.names)
+    np.testing.assert_allclose(np.array(list(named.values())), points, atol=1e-9)
+    lines = [[layout.names[i] for i in line.points] for line in found.lines]
+    assert ["right_lid_fold.0", "right_lid_fold.1", "right_lid_fold.2"] in lines
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "expected a .tem delineation, found an empty file"),
+        ("x\n", r"line 1: expected a finite number \(number of points\), found 'x'"),
+        ("0\n", "line 1: expected number of points, a whole number from 1"),
+        ("1e9\n", "line 1: expected number of points, a whole number from 1 to 99999"),
+        ("2\n1 2\n3\n", "ends before a point"),
+        ("1\n1 nan\n0\n", r"line 2: expected a finite number \(a point\), found 'nan'"),
+        (SMALL.replace("0 1\n", "0 3\n"), "line 8: expected a line's point, .* 0 to 2, found '3'"),
+        (SMALL.replace("1\n4", "2\n4"), "line 9: expected a line: 0 for open or 1 for closed"),
+        (SMALL + "9\n", "line 12: expected the end, found '9'"),
+        ("3\n1 2\n3 4\n5 6\n1\n0\n2\n0\n", "ends before a line's point"),
+    ],
+)
+def test_bad_files_are_told(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "bad.tem"
+    path.write_text(text)
+    with pytest.raises(FileFormatError, match=message) as raised:
+        read_tem(path)
+    assert str(raised.value).startswith(str(path))
+
+
+def test_other_bytes_and_no_file_are_told(tmp_path: Path) -> None:
+    (tmp_path / "bad.tem").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(FileFormatError, match="found other bytes"):
+        read_tem(tmp_path / "bad.tem")
+    with pytest.raises(InputError, match="a readable file"):
+        read_tem(tmp_path / "none.tem")
+
+
+def test_bad_values_are_not_written(tmp_path: Path) -> None:
+    path = tmp_path / "a.tem"
+    with pytest.raises(InputError, match="points: expected finite"):
+        write_tem(path, Delineation(np.full((2, 2), np.nan), ()))
+    with pytest.raises(InputError, match="lines: expected points from 0 to 1"):
+        write_tem(path, Delineation(np.zeros((2, 2)), (TemLine(False, np.array([0, 2])),)))
+    assert not path.exists()
+
+
+def test_another_template_is_told() -> None:
+    with pytest.raises(FileFormatError, match=r"a.tem: expected 134 points .*, found 83"):
+        points_from_tem(Delineation(np.zeros((83, 2)), ()), load_feature_layout(), "a.tem")
+
+
+def test_the_face_research_labs_template_is_understood(shared: Path) -> None:
+    """Hand-marked points of the real template lie where their names say."""
+    found = read_tem(shared / "data" / "london" / "001_03.tem")
+    assert len(found.points) == 189
+    named = points_from_tem(found, load_feature_layout())
+    width = named["left_eye_outer"][0] - named["right_eye_outer"][0]
+    assert width > 0
+    layout = load_feature_layout()
+    names = list(named)
+    places = layout.template[[layout.index(name) for name in names]]
+    marked = np.array([named[name] for name in names])
+    # An affine map of the template (its mouth is open) explains them to a few per cent.
+    design = np.column_stack([places, np.ones(len(places))])
+    fitted = design @ np.linalg.lstsq(design, marked, rcond=None)[0]
+    assert np.abs(fitted - marked).max() < 0.15 * width
