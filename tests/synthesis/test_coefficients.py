@@ -1,0 +1,108 @@
+"""Shares of examples by subregion (Z06 section 6)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mien.assets.feature_points import load_feature_layout
+from mien.assets.subregions import Subregions
+from mien.errors import InputError
+from mien.synthesis.coefficients import coefficients, hull_distances
+from mien.synthesis.examples import Example, ExampleSet
+from mien.synthesis.motion import PlanarMotion
+
+PHOTO = np.zeros((30, 20, 3), np.uint8)
+MOVED = PlanarMotion(np.array(1.2), np.array(0.1), np.array([3.0, 8.0]))
+
+
+@pytest.fixture(scope="module")
+def example_set():
+    """Neutral and four expressions of two subregions, free of head motion as they are."""
+    rng = np.random.default_rng(3)
+    layout = load_feature_layout()
+    rest = 100 + 200 * layout.template
+    motion = _rigid(rest)
+    examples = [Example("neutral", PHOTO, rest, "0.png")]
+    for number in range(1, 5):
+        change = 4 * rng.normal(size=rest.size)
+        change -= motion @ (motion.T @ change)
+        examples.append(Example(str(number), PHOTO, rest + change.reshape(-1, 2), f"{number}.png"))
+    half = len(rest) // 2
+    members = (np.arange(half), np.arange(half, len(rest)))
+    subregions = Subregions(("right", "left"), np.full((30, 20, 2), 0.5, np.float32), members)
+    return ExampleSet(layout, tuple(examples), 0, rest[None], subregions)
+
+
+def _rigid(points):
+    centred = points - points.mean(axis=0)
+    turned = centred[:, ::-1] * [-1, 1]
+    ones = np.ones(len(points))
+    columns = [np.outer(ones, [1, 0]), np.outer(ones, [0, 1]), centred, turned]
+    return np.linalg.qr(np.stack([column.ravel() for column in columns], axis=1))[0]
+
+
+@pytest.mark.parametrize("row", range(5))
+def test_an_examples_own_points_give_it_alone(example_set, row):
+    shares = coefficients(example_set, MOVED(example_set.examples[row].points))
+    np.testing.assert_allclose(shares, np.tile(np.eye(5)[row], (2, 1)), atol=1e-5)
+
+
+def test_a_mix_within_the_hull_is_found(example_set):
+    truth = np.array([0.4, 0.3, 0.0, 0.2, 0.1])
+    points = np.einsum("m,mnd->nd", truth, example_set.geometries)
+    shares = coefficients(example_set, MOVED(points), distance_penalty=0.0)
+    np.testing.assert_allclose(shares, np.tile(truth, (2, 1)), atol=1e-4)
+    np.testing.assert_allclose(hull_distances(example_set, MOVED(points)), 0, atol=1e-2)
+
+
+def test_shares_are_a_partition(example_set, rng):
+    points = example_set.neutral.points + 9 * rng.normal(size=example_set.neutral.points.shape)
+    shares = coefficients(example_set, points)
+    np.testing.assert_allclose(shares.sum(axis=1), 1, atol=1e-9)
+    assert shares.min() > -1e-9
+
+
+def test_a_heavy_penalty_leaves_the_nearest(example_set):
+    near, far = example_set.geometries[1], example_set.geometries[3]
+    shares = coefficients(example_set, 0.6 * near + 0.4 * far, distance_penalty=50.0)
+    np.testing.assert_allclose(shares[:, 1], 1, atol=1e-4)
+
+
+def test_hull_distance_is_of_the_subregion_that_leaves_it(example_set):
+    """One subregion moves along what no example does: all of it is out of reach."""
+    members = example_set.subregions.members[1]
+    geometries = example_set.geometries
+    seen = (geometries - geometries[0])[:, members].reshape(5, -1)
+    outside = np.zeros_like(geometries[0])
+    motion = _rigid(geometries[0])
+    full = np.zeros((5, geometries[0].size)).reshape(5, -1, 2)
+    full[:, members] = seen.reshape(5, -1, 2)
+    blocked = np.linalg.svd(np.hstack([motion, full.reshape(5, -1).T]))[0][:, :9]
+    step = np.zeros_like(geometries[0])
+    step[members] = np.random.default_rng(1).normal(size=(len(members), 2))
+    # Within the subregion, at right angles to head motion and to every example.
+    basis = blocked.reshape(*step.shape, -1)[members].reshape(-1, 9)
+    part = step[members].ravel()
+    part -= basis @ np.linalg.lstsq(basis, part, rcond=None)[0]
+    outside[members] = 5 * part.reshape(-1, 2) / np.sqrt(2 * np.mean(part**2))
+    distances = hull_distances(example_set, geometries[0] + outside)
+    np.testing.assert_allclose(distances, [0, 5], atol=0.01)
+
+
+def test_one_example_is_all_there_is(example_set):
+    alone = replace(example_set, examples=example_set.examples[:1])
+    np.testing.assert_allclose(coefficients(alone, example_set.examples[2].points), 1)
+
+
+@pytest.mark.parametrize("bad", [np.zeros((5, 2)), np.full((134, 2), np.nan)])
+def test_bad_points(example_set, bad):
+    with pytest.raises(InputError, match="points: expected"):
+        coefficients(example_set, bad)
+
+
+def test_a_negative_penalty(example_set):
+    with pytest.raises(InputError, match="distance_penalty"):
+        coefficients(example_set, example_set.neutral.points, distance_penalty=-1.0)
