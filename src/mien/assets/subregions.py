@@ -20,7 +20,7 @@ FORMAT = "mien subregions"
 OUTER_FADE = 1.0
 """The face fades out over this many widths of a blend: hair and jaw need a soft end."""
 
-_TEMPLATE_WIDTH_PX = 600
+_TEMPLATE_WIDTH_PX = 300
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,8 @@ class SubregionDrawing:
 
     Attributes:
         names: of the subregions.
-        groups: within a group, neighbours blend; between groups borders are hard.
+        groups: within a group, neighbours blend; between groups borders are hard. The first one's
+            group fades out around the face.
         corners: of each polygon, (c, n + k): mixes of the layout's points and its frame's.
         blends: width of the blend along each one's borders, in widths of the face; one a group.
     """

@@ -30,12 +30,8 @@ FRL_SHARED = {
     "left_lower_eyelid.2": 33,
     "right_lid_fold.1": 36,
     "left_lid_fold.1": 41,
-    "right_brow_upper.4": 71,
-    "left_brow_upper.4": 82,
     "right_nose_wing.1": 62,
-    "right_nose_wing.2": 64,
     "left_nose_wing.1": 67,
-    "left_nose_wing.2": 69,
     "nose_base": 55,
     "right_mouth_corner": 87,
     "left_mouth_corner": 93,
@@ -47,7 +43,11 @@ FRL_SHARED = {
     "lower_lip_outer": 106,
     "menton": 129,
 }
-"""What zhang134 shares with the Face Research Lab's template of 189 points, WebMorph's own."""
+"""What zhang134 shares with the Face Research Lab's template of 189 points, WebMorph's own.
+
+Hand-marked faces and the detector agree on these to 3 % of the distance between the outer corners
+of the eyes; tails of brows and rims of nostrils look alike but lie 4 to 8 % apart.
+"""
 
 
 @dataclass(frozen=True)
