@@ -75,9 +75,9 @@ class HeldOut:
         return replace(self, truth=truth, statistics=statistics)
 
     def _seen_by(self, known: Array, displacements: Array) -> Array:
-        geometries = displacements + self.neutral
-        _, motion = compensated(geometries[:, known], self.neutral[known])
-        return motion.undo(geometries) - self.neutral
+        geometries, _ = compensated(displacements + self.neutral, self.neutral, by=known)
+        seen: Array = geometries - self.neutral
+        return seen
 
 
 def held_out(clip: Path, layout: FeatureLayout, detector: LandmarkDetector) -> HeldOut:

@@ -63,6 +63,15 @@ def test_a_batch_is_its_parts(rng, neutral):
     np.testing.assert_allclose(motion(geometries), points)
 
 
+def test_points_that_tell_nothing_of_the_motion_may_do_as_they_like(rng, neutral):
+    still = np.array([1, 4, 9])
+    expression = neutral + rng.normal(size=neutral.shape)
+    expression[still] = neutral[still]
+    geometry, motion = compensated(TRUE(expression), neutral, by=still)
+    assert motion.a == pytest.approx(1.1)
+    np.testing.assert_allclose(geometry, expression)
+
+
 def test_two_points_suffice(neutral):
     geometry, _ = compensated(TRUE(neutral[:2]), neutral[:2])
     np.testing.assert_allclose(geometry, neutral[:2])
@@ -72,9 +81,9 @@ def test_two_points_suffice(neutral):
     ("points", "neutral", "message"),
     [
         (np.zeros((1, 2)), np.zeros((1, 2)), "source: expected at least 2 points, got 1"),
-        (np.zeros((4, 2)), np.ones((5, 2)), "target: expected shape"),
-        (np.full((5, 2), np.nan), np.ones((5, 2)), "target: expected finite numbers"),
-        (np.ones((5, 2)), np.full((5, 2), np.inf), "source: expected finite numbers"),
+        (np.zeros((4, 2)), np.ones((5, 2)), "points: expected shape"),
+        (np.full((5, 2), np.nan), np.ones((5, 2)), "points: expected finite numbers"),
+        (np.ones((5, 2)), np.full((5, 2), np.inf), "neutral: expected finite numbers"),
     ],
 )
 def test_bad_input_is_named(points, neutral, message):
