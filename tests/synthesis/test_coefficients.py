@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from mien.assets.feature_points import load_feature_layout
-from mien.assets.subregions import Subregions
+from mien.assets.subregions import Subregions, default_subregions
 from mien.errors import InputError
-from mien.synthesis.coefficients import coefficients, hull_distances
+from mien.synthesis.coefficients import UPPER_FACE, coefficients, hull_distances
 from mien.synthesis.examples import Example, ExampleSet
 from mien.synthesis.motion import PlanarMotion
 
@@ -106,3 +106,38 @@ def test_bad_points(example_set, bad):
 def test_a_negative_penalty(example_set):
     with pytest.raises(InputError, match="distance_penalty"):
         coefficients(example_set, example_set.neutral.points, distance_penalty=-1.0)
+
+
+def test_subregions_together_have_the_same_shares(example_set):
+    points = np.array(example_set.neutral.points)
+    half = example_set.subregions.members[0]
+    points[half] = example_set.examples[2].points[half]
+    apart = coefficients(example_set, points)
+    shares = coefficients(example_set, points, together=[("right", "left")])
+    assert np.abs(apart[0] - apart[1]).max() > 0.1
+    np.testing.assert_array_equal(shares[0], shares[1])
+    np.testing.assert_allclose(shares.sum(axis=1), 1, atol=1e-9)
+
+
+def test_a_group_of_one_changes_nothing(example_set, rng):
+    points = example_set.neutral.points + 9 * rng.normal(size=example_set.neutral.points.shape)
+    alone = coefficients(example_set, points, together=[("left",)])
+    np.testing.assert_allclose(alone, coefficients(example_set, points))
+
+
+@pytest.mark.parametrize(
+    ("together", "message"),
+    [
+        ([("ear",)], "together: expected subregions of right, left, got ear"),
+        ([("left",), ("right", "left")], "each subregion in one group, got left twice"),
+    ],
+)
+def test_bad_groups(example_set, together, message):
+    with pytest.raises(InputError, match=message):
+        coefficients(example_set, example_set.neutral.points, together=together)
+
+
+def test_the_upper_face_is_of_the_subregions_that_ship():
+    layout = load_feature_layout()
+    drawn = default_subregions(layout, 100 + 200 * layout.template, (320, 400))
+    assert set(UPPER_FACE) < set(drawn.names)

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
+
 import numpy as np
 
-from mien.arrays import Array, Float, check_array
+from mien.arrays import Array, Float, Int, check_array
 from mien.errors import InputError
 from mien.numeric.simplex import simplex_least_squares
 from mien.synthesis.examples import ExampleSet
 
-__all__ = ["coefficients", "hull_distances"]
+__all__ = ["UPPER_FACE", "coefficients", "hull_distances"]
+
+UPPER_FACE = (
+    "forehead",
+    "right_brow",
+    "left_brow",
+    "right_lids",
+    "left_lids",
+    "right_eye",
+    "left_eye",
+)
+"""What moves as one above the nose. A detector's points say less of it than of the mouth."""
 
 
 def coefficients(
@@ -18,6 +31,7 @@ def coefficients(
     *,
     distance_penalty: float = 0.02,
     slack: float = 0.0,
+    together: Sequence[Collection[str]] = (),
 ) -> Float[Array, "R m"]:
     """Each subregion's geometry as a mix of the examples' geometries.
 
@@ -25,25 +39,49 @@ def coefficients(
         points: (n, 2) px of any photo, all that the layout has.
         distance_penalty: the paper has 0. Beyond it, what an example costs by its squared distance
             from the geometry asked for, those being 1 in the mean: of two mixes that fit alike,
-            the one of near examples wins, which is less blurred. On clips this gives 0 to 0.8 dB;
-            from 0.3 on it takes as much.
+            the one of near examples wins. On two clips, with 15 to 220 examples, -0.05 to 0.2 dB
+            on the median frame; 0.3 takes up to 0.8 dB and leaves more detail.
+        together: groups of subregions, by name, that get the same shares, from all their points;
+            the paper has none. `UPPER_FACE` as one shows fewer double brows and mixed gazes.
         slack: how far below 0 shares may fall; the paper has 0. More leaves the convex hull.
     Returns: (R, m) shares; each row sums to 1.
-    Raises: InputError: shape, NaN, a negative penalty. EstimationError: all points in one place.
+    Raises: InputError: shape, NaN, a negative penalty, a group that names no subregion or shares
+        one with another. EstimationError: all points in one place.
     Source: Z06 section 6, eq. (2) to (5).
     """
-    if not distance_penalty >= 0:
-        raise InputError("distance_penalty", "a number from 0 on", distance_penalty)
-    rows = []
-    for offsets in _offsets(example_set, points):
-        apart = (offsets**2).sum(axis=0)
-        size = float(apart.mean()) or 1.0
-        penalty = distance_penalty * apart / size
-        target = np.zeros(len(offsets))
-        # Relative to the target, for shares sum to 1: rounding is then that of small numbers.
-        scaled = offsets / np.sqrt(size)
-        rows.append(simplex_least_squares(scaled, target, slack=slack, penalty=penalty))
-    return np.stack(rows)
+    if not 0 <= distance_penalty < np.inf:
+        raise InputError("distance_penalty", "a number of at least 0", distance_penalty)
+    apart = _apart(example_set, points)
+    shares = np.empty((len(example_set.subregions.names), len(apart)))
+    for rows in _groups(example_set.subregions.names, together):
+        members = np.unique(np.concatenate([example_set.subregions.members[row] for row in rows]))
+        shares[rows] = _shares(_columns(apart, members), distance_penalty, slack)
+    return shares
+
+
+def _shares(
+    offsets: Float[Array, "d m"], distance_penalty: float, slack: float
+) -> Float[Array, " m"]:
+    """The mix of examples, told relative to the target, that is nearest to it."""
+    squares = (offsets**2).sum(axis=0)
+    size = float(squares.mean()) or 1.0
+    penalty = distance_penalty * squares / size
+    target = np.zeros(len(offsets))
+    scaled = offsets / np.sqrt(size)
+    return simplex_least_squares(scaled, target, slack=slack, penalty=penalty)
+
+
+def _groups(names: Sequence[str], together: Sequence[Collection[str]]) -> list[list[int]]:
+    """Rows of subregions that get the same shares; every subregion in one group."""
+    grouped = [name for group in together for name in group]
+    unknown = sorted(set(grouped) - set(names))
+    if unknown:
+        raise InputError("together", f"subregions of {', '.join(names)}", unknown[0])
+    if len(set(grouped)) < len(grouped):
+        twice = next(name for name in grouped if grouped.count(name) > 1)
+        raise InputError("together", "each subregion in one group", f"{twice} twice")
+    groups = [[names.index(name) for name in group] for group in together if group]
+    return groups + [[row] for row, name in enumerate(names) if name not in grouped]
 
 
 def hull_distances(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Float[Array, " R"]:
@@ -56,13 +94,21 @@ def hull_distances(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Floa
     Raises: as `coefficients`.
     """
     shares = coefficients(example_set, points, distance_penalty=0.0)
-    parts = zip(_offsets(example_set, points), shares, strict=True)
-    return np.array([np.sqrt(2 * np.mean((offsets @ row) ** 2)) for offsets, row in parts])
+    apart = _apart(example_set, points)
+    parts = zip(example_set.subregions.members, shares, strict=True)
+    return np.array(
+        [np.sqrt(2 * np.mean((_columns(apart, members) @ row) ** 2)) for members, row in parts]
+    )
 
 
-def _offsets(example_set: ExampleSet, points: Float[Array, "n 2"]) -> list[Float[Array, "d m"]]:
-    """Of each subregion, the examples' geometries relative to the one asked for."""
+def _apart(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Float[Array, "m n 2"]:
+    """The examples' geometries relative to the one asked for."""
     points = check_array("points", points, (len(example_set.layout.names), 2))
-    apart = example_set.geometries - example_set.geometry(points)
-    count = len(apart)
-    return [apart[:, members].reshape(count, -1).T for members in example_set.subregions.members]
+    apart: Array = example_set.geometries - example_set.geometry(points)
+    return apart
+
+
+def _columns(apart: Float[Array, "m n 2"], members: Int[Array, " k"]) -> Float[Array, "d m"]:
+    """Of some points, one column an example."""
+    columns: Array = apart[:, members].reshape(len(apart), -1).T
+    return columns
