@@ -9,7 +9,7 @@ from mien.errors import EstimationError, InputError
 
 __all__ = ["simplex_least_squares"]
 
-_ACCURACY = 1e-11
+_ACCURACY = 1e-12
 
 
 def simplex_least_squares(
@@ -69,7 +69,7 @@ def _solved(quadratic: Array, linear: Array, slack: float) -> Float[Array, " m"]
     )
     status = solver.solve()
     shares: Array = np.asarray(solver.result.x, np.float64).copy()
-    if status != piqp.PIQP_SOLVED and not np.isfinite(shares).all():
+    if status != piqp.PIQP_SOLVED:
         raise EstimationError(f"no nearest mixture was found: {status}")
     # An interior point keeps off the bounds by its accuracy.
     above = np.maximum(shares + slack, 0.0)
