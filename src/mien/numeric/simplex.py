@@ -9,8 +9,7 @@ from mien.errors import EstimationError, InputError
 
 __all__ = ["simplex_least_squares"]
 
-# Of a few problems in ten thousand rounding keeps the first out of reach.
-_ACCURACIES = (1e-12, 1e-9)
+_ACCURACY = 1e-12
 
 
 def simplex_least_squares(
@@ -58,15 +57,17 @@ def _solved(quadratic: Array, linear: Array, slack: float) -> Float[Array, " m"]
     import piqp
 
     count = len(linear)
-    problem = (np.asfortranarray(quadratic), linear, np.ones((1, count), order="F"), np.ones(1))
-    for accuracy in _ACCURACIES:
-        solver = piqp.DenseSolver()
-        solver.settings.eps_abs = solver.settings.eps_duality_gap_abs = accuracy
-        solver.settings.eps_rel = solver.settings.eps_duality_gap_rel = 0.0
-        solver.setup(*problem, x_l=np.full(count, -slack))
-        status = solver.solve()
-        if status == piqp.PIQP_SOLVED:
-            break
+    solver = piqp.DenseSolver()
+    solver.settings.eps_abs = solver.settings.eps_duality_gap_abs = _ACCURACY
+    solver.settings.eps_rel = solver.settings.eps_duality_gap_rel = 0.0
+    solver.setup(
+        np.asfortranarray(quadratic),
+        linear,
+        np.ones((1, count), order="F"),
+        np.ones(1),
+        x_l=np.full(count, -slack),
+    )
+    status = solver.solve()
     shares: Array = np.asarray(solver.result.x, np.float64).copy()
     if status != piqp.PIQP_SOLVED:
         raise EstimationError(f"no nearest mixture was found: {status}")
