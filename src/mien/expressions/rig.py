@@ -140,8 +140,9 @@ class Rig:
         self, expressions: Mapping[str, Mapping[str, float]]
     ) -> Float[Array, "r k"]:
         """(R, K) weights in each of REGIONS."""
+        rows = region_rows(tuple(expressions))
         own = [self._weights({}), *(self._weights(given) for given in expressions.values())]
-        return np.array(own)[region_rows(tuple(expressions))]
+        return np.array(own)[rows]
 
     def _weights(self, given: Mapping[str, float]) -> Float[Array, " k"]:
         weights = np.zeros(len(self.names))
