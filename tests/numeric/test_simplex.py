@@ -52,6 +52,28 @@ def test_with_a_penalty_no_exchange_between_two_columns_is_better(seed):
     assert slopes.min() > slopes[used].max() - 1e-5
 
 
+@pytest.mark.parametrize("seed", [63, 96, 248, 557])
+def test_where_rounding_stops_the_solver_early(seed):
+    """Columns far from 0, some the same, and costs of all sizes: what is reached is the least."""
+    rng = np.random.default_rng(seed)
+    rows, count = rng.integers(2, 80), rng.integers(2, 50)
+    columns = rng.normal(size=(rows, count)) * 10 ** rng.uniform(-1, 3)
+    columns += rng.normal() * 10 ** rng.uniform(0, 3)
+    if rng.random() < 0.5:
+        columns[:, count // 2 :] = columns[:, : count - count // 2]
+    target = columns @ rng.dirichlet(np.ones(count))
+    target += rng.normal(size=rows) * rng.choice([0, 1, 100])
+    rng.random()
+    penalty = rng.uniform(0, 1, count) * 10 ** rng.uniform(-3, 4)
+    shares = simplex_least_squares(columns, target, penalty=penalty)
+    slopes = 2 * columns.T @ (columns @ shares - target) + penalty
+    # A convex cost is no farther above its least than this.
+    scale = ((columns - target[:, None]) ** 2).sum(axis=0).max() + penalty.max()
+    assert shares @ slopes - slopes.min() < 1e-6 * scale
+    assert abs(shares.sum() - 1) < 1e-12
+    assert shares.min() >= 0
+
+
 def test_a_mixture_is_found_again():
     rng = np.random.default_rng(0)
     columns = rng.normal(size=(30, 8))

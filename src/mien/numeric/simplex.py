@@ -9,7 +9,8 @@ from mien.errors import EstimationError, InputError
 
 __all__ = ["simplex_least_squares"]
 
-_ACCURACY = 1e-12
+_ACCURACIES = (1e-12, 1e-8, 1e-6)
+"""Of a cost whose greatest coefficient is 2: the best that rounding lets the solver reach."""
 
 
 def simplex_least_squares(
@@ -54,25 +55,32 @@ def simplex_least_squares(
 
 
 def _solved(quadratic: Array, linear: Array, slack: float) -> Float[Array, " m"]:
-    import piqp
-
     count = len(linear)
-    solver = piqp.DenseSolver()
-    solver.settings.eps_abs = solver.settings.eps_duality_gap_abs = _ACCURACY
-    solver.settings.eps_rel = solver.settings.eps_duality_gap_rel = 0.0
-    solver.setup(
-        np.asfortranarray(quadratic),
-        linear,
-        np.ones((1, count), order="F"),
-        np.ones(1),
-        x_l=np.full(count, -slack),
-    )
-    status = solver.solve()
-    shares: Array = np.asarray(solver.result.x, np.float64).copy()
-    if status != piqp.PIQP_SOLVED:
-        raise EstimationError(f"no nearest mixture was found: {status}")
+    shares = _interior(quadratic, linear, slack)
     # An interior point keeps off the bounds by its accuracy.
     above = np.maximum(shares + slack, 0.0)
     above[above < 1e-9] = 0.0
     result: Array = above * ((1.0 + count * slack) / above.sum()) - slack
     return result
+
+
+def _interior(quadratic: Array, linear: Array, slack: float) -> Float[Array, " m"]:
+    """As accurate as it can be had: columns that are the same, and great costs, cost digits."""
+    import piqp
+
+    count = len(linear)
+    for accuracy in _ACCURACIES:
+        solver = piqp.DenseSolver()
+        solver.settings.eps_abs = solver.settings.eps_duality_gap_abs = accuracy
+        solver.settings.eps_rel = solver.settings.eps_duality_gap_rel = 0.0
+        solver.setup(
+            np.asfortranarray(quadratic),
+            linear,
+            np.ones((1, count), order="F"),
+            np.ones(1),
+            x_l=np.full(count, -slack),
+        )
+        status = solver.solve()
+        if status == piqp.PIQP_SOLVED:
+            return np.array(solver.result.x, np.float64)
+    raise EstimationError(f"no nearest mixture was found: {status}")
