@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from documents import put
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.assets.generic import load_generic_head
 from mien.errors import FileFormatError, InputError
@@ -147,40 +148,31 @@ def _stored() -> dict[str, Any]:
     return document
 
 
-def _set(*keys: str | int, to: Any) -> Callable[[Any], None]:
-    def change(document: Any) -> None:
-        for key in keys[:-1]:
-            document = document[key]
-        document[keys[-1]] = to
-
-    return change
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (_set("format", to="other"), "format: expected 'mien feature points', found 'other'"),
-        (_set("version", to=2), "version: expected 1, found 2: written by a newer mien"),
-        (_set("points", to=3), "points: expected a list, found 3"),
-        (_set("points", 1, to=[]), r"points\[1\]: expected an object"),
-        (_set("points", 1, "name", to="right_brow_upper.0"), "'right_brow_upper.0' appears twice"),
-        (_set("points", 8, "mirror", to="nose"), "mirror: unknown point 'nose'"),
-        (_set("points", 8, "mirror", to="chin"), "right_eye_inner.mirror: its counterpart 'chin'"),
-        (_set("points", 3, "template", to=[1]), "template: expected numbers of shape"),
-        (_set("points", 8, "landmarks", to={"478": 1}), "landmarks: unknown point '478'"),
+        (put("format", to="other"), "format: expected 'mien feature points', found 'other'"),
+        (put("version", to=2), "version: expected 1, found 2: written by a newer mien"),
+        (put("points", to=3), "points: expected a list, found 3"),
+        (put("points", 1, to=[]), r"points\[1\]: expected an object"),
+        (put("points", 1, "name", to="right_brow_upper.0"), "'right_brow_upper.0' appears twice"),
+        (put("points", 8, "mirror", to="nose"), "mirror: unknown point 'nose'"),
+        (put("points", 8, "mirror", to="chin"), "right_eye_inner.mirror: its counterpart 'chin'"),
+        (put("points", 3, "template", to=[1]), "template: expected numbers of shape"),
+        (put("points", 8, "landmarks", to={"478": 1}), "landmarks: unknown point '478'"),
         (
-            _set("points", 8, "landmarks", to={"4": "x"}),
+            put("points", 8, "landmarks", to={"4": "x"}),
             "right_eye_inner.landmarks: expected a num",
         ),
-        (_set("points", 8, "landmarks", to={"4": 0.9}), "shares that sum to 1, found 0.9"),
-        (_set("sets", 1, to=[]), r"sets\[1\]: expected an object of lists of points"),
-        (_set("sets", 1, "nose_region", to=["x"]), r"sets\[1\].nose_region: unknown point 'x'"),
-        (_set("sets", to=[{"a": ["chin"]}, {"b": ["menton"]}]), r"sets\[1\].b: shares no point"),
-        (_set("sets", to=[{"a": ["chin"]}]), "sets: 'right_brow_upper.0' belongs to none"),
-        (_set("triangles", 0, to=[0, 1, 150]), "triples of whole numbers from 0 to 149"),
-        (_set("triangles", 0, to=[0, 1]), "triples of whole numbers from 0 to 149"),
-        (_set("rigid", to=["chin"]), "rigid: expected at least 2 points"),
-        (_set("frame", 0, to=[0, float("nan")]), "frame: expected finite numbers"),
+        (put("points", 8, "landmarks", to={"4": 0.9}), "shares that sum to 1, found 0.9"),
+        (put("sets", 1, to=[]), r"sets\[1\]: expected an object of lists of points"),
+        (put("sets", 1, "nose_region", to=["x"]), r"sets\[1\].nose_region: unknown point 'x'"),
+        (put("sets", to=[{"a": ["chin"]}, {"b": ["menton"]}]), r"sets\[1\].b: shares no point"),
+        (put("sets", to=[{"a": ["chin"]}]), "sets: 'right_brow_upper.0' belongs to none"),
+        (put("triangles", 0, to=[0, 1, 150]), "triples of whole numbers from 0 to 149"),
+        (put("triangles", 0, to=[0, 1]), "triples of whole numbers from 0 to 149"),
+        (put("rigid", to=["chin"]), "rigid: expected at least 2 points"),
+        (put("frame", 0, to=[0, float("nan")]), "frame: expected finite numbers"),
     ],
 )
 def test_a_bad_layout_is_told_in_one_line(

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import mien.assets
+from documents import put
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.assets.subregions import Subregions, default_subregions, load_subregion_drawing
 from mien.errors import FileFormatError, InputError
@@ -171,29 +172,20 @@ def test_bad_calls_are_told(layout: FeatureLayout, points: np.ndarray) -> None:
         default_subregions(layout, points, (0, 300))
 
 
-def _set(*keys: str | int, to: Any) -> Callable[[Any], None]:
-    def change(document: Any) -> None:
-        for key in keys[:-1]:
-            document = document[key]
-        document[keys[-1]] = to
-
-    return change
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (_set("layout", to="ibug68"), "layout: expected 'zhang134', found 'ibug68'"),
-        (_set("groups", to=None), "groups: expected an object, found None"),
-        (_set("groups", "skin", to=0), "groups.skin: expected a number between 0 and 1, found '0'"),
-        (_set("regions", to=[]), "regions: expected at least one"),
-        (_set("regions", 2, "name", to="left_cheek"), r"regions\[2\]: 'left_cheek' appears twice"),
-        (_set("regions", 1, "mirror_of", to="nose"), "mirror_of: no subregion 'nose' before"),
-        (_set("regions", 0, "group", to="hair"), "right_cheek.group: unknown group 'hair'"),
-        (_set("regions", 0, "corners", 1, to=3), r"right_cheek.corners\[1\]: expected an object"),
-        (_set("regions", 0, "corners", 1, to={"nos": 1}), r"corners\[1\]: unknown point 'nos'"),
-        (_set("regions", 0, "corners", 1, to={"chin": 0.5}), "shares that sum to 1, found 0.5"),
-        (_set("regions", 0, "corners", to=[]), "right_cheek.corners: expected at least 3, found 0"),
+        (put("layout", to="ibug68"), "layout: expected 'zhang134', found 'ibug68'"),
+        (put("groups", to=None), "groups: expected an object, found None"),
+        (put("groups", "skin", to=0), "groups.skin: expected a number between 0 and 1, found '0'"),
+        (put("regions", to=[]), "regions: expected at least one"),
+        (put("regions", 2, "name", to="left_cheek"), r"regions\[2\]: 'left_cheek' appears twice"),
+        (put("regions", 1, "mirror_of", to="nose"), "mirror_of: no subregion 'nose' before"),
+        (put("regions", 0, "group", to="hair"), "right_cheek.group: unknown group 'hair'"),
+        (put("regions", 0, "corners", 1, to=3), r"right_cheek.corners\[1\]: expected an object"),
+        (put("regions", 0, "corners", 1, to={"nos": 1}), r"corners\[1\]: unknown point 'nos'"),
+        (put("regions", 0, "corners", 1, to={"chin": 0.5}), "shares that sum to 1, found 0.5"),
+        (put("regions", 0, "corners", to=[]), "right_cheek.corners: expected at least 3, found 0"),
     ],
 )
 def test_a_bad_drawing_is_told_in_one_line(

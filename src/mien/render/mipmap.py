@@ -46,7 +46,7 @@ def build_pyramids(textures: Sequence[UInt8[Array, "h w 3"]]) -> Pyramids:
         if found != sizes:
             expected = f"{sizes[0][1]}x{sizes[0][0]} px as texture 0 has"
             raise InputError(f"texture {index}", expected, f"{found[0][1]}x{found[0][0]}")
-        rows.append(np.concatenate([_packed(level) for level in levels]))
+        rows.append(np.concatenate([packed_texels(level) for level in levels]))
     heights, widths = np.array(sizes, np.int64).T.copy()
     starts = np.concatenate([[0], np.cumsum(widths * heights)[:-1]])
     return Pyramids(frozen(np.stack(rows)), frozen(widths), frozen(heights), frozen(starts))
@@ -62,7 +62,8 @@ def _halved(texture: Array) -> list[Array]:
     return levels
 
 
-def _packed(level: Array) -> Int[Array, " n"]:
+def packed_texels(level: UInt8[Array, "h w 3"]) -> Int[Array, " n"]:
+    """(h * w,) uint32, red lowest, row after row."""
     import cv2
 
     packed: Array = cv2.cvtColor(np.ascontiguousarray(level), cv2.COLOR_RGB2RGBA)
@@ -157,14 +158,14 @@ def weighted_texels(
     texels: Array, texture: int, fine: Four, coarse: Four
 ) -> tuple[float, float, float]:
     """One texture's colour, from 0 to 255."""
-    total = _spread(texels[texture, fine[0]]) * fine[4]
-    total += _spread(texels[texture, fine[1]]) * fine[5]
-    total += _spread(texels[texture, fine[2]]) * fine[6]
-    total += _spread(texels[texture, fine[3]]) * fine[7]
-    total += _spread(texels[texture, coarse[0]]) * coarse[4]
-    total += _spread(texels[texture, coarse[1]]) * coarse[5]
-    total += _spread(texels[texture, coarse[2]]) * coarse[6]
-    total += _spread(texels[texture, coarse[3]]) * coarse[7]
+    total = spread_texel(texels[texture, fine[0]]) * fine[4]
+    total += spread_texel(texels[texture, fine[1]]) * fine[5]
+    total += spread_texel(texels[texture, fine[2]]) * fine[6]
+    total += spread_texel(texels[texture, fine[3]]) * fine[7]
+    total += spread_texel(texels[texture, coarse[0]]) * coarse[4]
+    total += spread_texel(texels[texture, coarse[1]]) * coarse[5]
+    total += spread_texel(texels[texture, coarse[2]]) * coarse[6]
+    total += spread_texel(texels[texture, coarse[3]]) * coarse[7]
     lane = np.uint64(0x1FFFFF)
     red = np.int64(total & lane)
     green = np.int64((total >> np.uint64(21)) & lane)
@@ -173,7 +174,7 @@ def weighted_texels(
 
 
 @njit(inline="always")
-def _spread(texel: np.uint32) -> np.uint64:
+def spread_texel(texel: np.uint32) -> np.uint64:
     """Every channel in the lowest 8 of 21 bits."""
     wide = np.uint64(texel)
     green, blue = wide & np.uint64(0xFF00), wide & np.uint64(0xFF0000)

@@ -12,13 +12,11 @@ from mien.errors import InputError
 from mien.numeric.raster import rasterize_rows, unfilled
 from mien.numeric.threads import for_row_bands
 from mien.numeric.warp import corner_places, place
+from mien.render.mipmap import UNIT, packed_texels, spread_texel
 from mien.synthesis.examples import ExampleSet
 
 __all__ = ["Composer"]
 
-# A texel's three channels are weighted by one multiplication, as in render/mipmap.py: 21 of 64
-# bits each, 8 for the colour and 13 for the weight.
-_UNIT = 8192
 _MIXED, _NONE = -1, -2
 
 
@@ -122,7 +120,7 @@ class Composer:
         kept[empty] = shares[empty]
         kept /= kept.sum(1, keepdims=True)
         order = np.argsort(kept == 0, axis=1, kind="stable")
-        weights = np.take_along_axis(kept, order, axis=1) / _UNIT
+        weights = np.take_along_axis(kept, order, axis=1) / UNIT
         return _Mixtures(
             frozen(shares.astype(np.float32)),
             frozen(order.astype(np.int32)),
@@ -132,13 +130,10 @@ class Composer:
 
 
 def _packed(photos: list[UInt8[Array, "h w 3"]]) -> _Photos:
-    import cv2
-
     sizes = np.array([photo.shape[:2] for photo in photos], np.int64)
     if sizes.min() < 2:
         raise InputError("photos", "at least two rows and columns", f"{sizes.min()}")
-    packed = [cv2.cvtColor(np.ascontiguousarray(p), cv2.COLOR_RGB2RGBA) for p in photos]
-    texels = np.concatenate([p.view(np.uint32).ravel() for p in packed])
+    texels = np.concatenate([packed_texels(photo) for photo in photos])
     starts = np.concatenate([[0], np.cumsum(sizes.prod(1))[:-1]])
     heights, widths = sizes.T.copy()
     return _Photos(frozen(texels), frozen(starts), frozen(widths), frozen(heights))
@@ -158,36 +153,28 @@ def _blocks(fades: Float[Array, "h w r"]) -> Int[Array, "h w"]:
 
 
 @njit(inline="always")
-def _spread(texel: np.uint32) -> np.uint64:
-    """Every channel in the lowest 8 of 21 bits."""
-    wide = np.uint64(texel)
-    green, blue = wide & np.uint64(0xFF00), wide & np.uint64(0xFF0000)
-    return (wide & np.uint64(0xFF)) | (green << np.uint64(13)) | (blue << np.uint64(26))
-
-
-@njit(inline="always")
 def _look_up(
     texels: Array, start: int, width: int, height: int, x: np.float32, y: np.float32
 ) -> np.uint64:
-    """A photo's colour at x, y px, three lanes of _UNIT times 0 to 255."""
+    """A photo's colour at x, y px, three lanes of UNIT times 0 to 255."""
     half, edge = np.float32(0.5), np.float32(1.001)
     x = min(max(x - half, np.float32(0)), np.float32(width) - edge)
     y = min(max(y - half, np.float32(0)), np.float32(height) - edge)
     col, row = int(x), int(y)
-    unit = np.float32(_UNIT)
+    unit = np.float32(UNIT)
     right, low = np.float32(x - np.float32(col)), np.float32(y - np.float32(row))
     # Rounded so that they sum to the unit: a plain colour stays.
     below = np.uint64(low * unit + half)
-    above = np.uint64(_UNIT) - below
+    above = np.uint64(UNIT) - below
     above_right = np.uint64(right * np.float32(above) + half)
     below_right = np.uint64(right * np.float32(below) + half)
     # Unsigned: indices that may be negative would be looked at one by one.
     n = np.uint64(start + row * width + col)
     one, step = np.uint64(1), np.uint64(width)
-    total: np.uint64 = _spread(texels[n]) * (above - above_right)
-    total += _spread(texels[n + one]) * above_right
-    total += _spread(texels[n + step]) * (below - below_right)
-    total += _spread(texels[n + step + one]) * below_right
+    total: np.uint64 = spread_texel(texels[n]) * (above - above_right)
+    total += spread_texel(texels[n + one]) * above_right
+    total += spread_texel(texels[n + step]) * (below - below_right)
+    total += spread_texel(texels[n + step + one]) * below_right
     return total
 
 
@@ -229,7 +216,7 @@ def _kept(weights: Array, inside: np.float32, skip: float, used: Array, kept: Ar
             used[i], kept[i] = i, weights[i]
             total += weights[i]
     for n in range(count):
-        kept[n] *= inside / (total * np.float32(_UNIT))
+        kept[n] *= inside / (total * np.float32(UNIT))
     return count
 
 

@@ -76,8 +76,7 @@ class _Redrawn:
         layers = np.dstack([layers, *changes]) if changes else layers
         flows.counted[self.numeric] = 0
         answers = _with_layers(scene.model.answers, self.numeric)
-        weights = scene.weights * drawing.mask
-        shown = (drawn, target, weights, layers)
+        shown = (layers, drawn, target, scene.weights)
         samples = take_samples(drawing, *shown, answers, flows.lens, scale=scene.scale)
         moved = Moved(np.eye(3), np.zeros(3), flows.lens, np.zeros(len(flows.counted)))
         return sum_up(samples, moved, flows, answers)

@@ -35,6 +35,15 @@ class Pose:
     zoom: float = 1.0
 
 
+Lens = tuple[float, float, float]
+"""Focal length and principal point, px."""
+
+
+def lens_of(view: View, pose: Pose) -> Lens:
+    """Of a view, as the pose zooms it."""
+    return float(view.focal * pose.zoom), float(view.cx), float(view.cy)
+
+
 class Drawing(NamedTuple):
     """What a view shows of the model.
 
@@ -152,7 +161,7 @@ def _placed(
     places, points, depth = np.empty((count, 3)), np.empty((count, 2)), np.empty(count)
     motion = np.empty((3, 4))
     motion[:, :3], motion[:, 3] = pose.R, pose.t
-    lens = (float(view.focal * pose.zoom), float(view.cx), float(view.cy))
+    lens = lens_of(view, pose)
     shades = np.empty((count, 2 + textures), np.float32)
     seen = (face.vertices, face.brightness, face.weights)
     _place_vertices(*seen, motion, lens, places, points, depth, shades)
@@ -168,7 +177,7 @@ def _place_vertices(
     brightness: Array,
     weights: Array,
     motion: Array,
-    lens: tuple[float, float, float],
+    lens: Lens,
     places: Array,
     points: Array,
     depth: Array,

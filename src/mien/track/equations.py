@@ -80,15 +80,15 @@ def sum_up(
     """
     sets, most = answers.sets.shape
     side = most if matrix else 0
-    count = -(-len(samples.drawn) // _BLOCK)
-    matrices, vectors = np.zeros((count, sets, side, side)), np.zeros((count, sets, most))
-    totals = np.zeros((count, 2))
+    parts = -(-len(samples.drawn) // _BLOCK)
+    matrices, vectors = np.zeros((parts, sets, side, side)), np.zeros((parts, sets, most))
+    totals = np.zeros((parts, 2))
     inputs = (samples, moved, flows, answers)
 
     def blocks(first: int, end: int) -> None:
         _add_blocks(*inputs, first, end, matrices, vectors, totals)
 
-    for_row_bands(blocks, count, work=5 * len(samples.drawn))
+    for_row_bands(blocks, parts, work=5 * len(samples.drawn))
     count = len(answers.region)
     half, vector = np.zeros((count, count)), np.zeros(count)
     _scatter(matrices, vectors, answers.sets, answers.sizes, half, vector)

@@ -8,8 +8,7 @@ import numpy as np
 from numba import njit
 
 from mien.arrays import Array, Float
-from mien.track.drawing import Pose
-from mien.track.samples import Lens
+from mien.track.drawing import Lens, Pose, lens_of
 from mien.track.views import View
 
 POSE_UNKNOWNS = 7
@@ -44,11 +43,6 @@ def screen_flows(
     _flow_rows(moves, places, pose.R, lens[0], face)
     counted = np.ones(POSE_UNKNOWNS + len(moves), np.float32)
     return Flows(face, pose.t, lens, counted)
-
-
-def lens_of(view: View, pose: Pose) -> Lens:
-    """Of a view, as the pose zooms it."""
-    return float(view.focal * pose.zoom), view.cx, view.cy
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")

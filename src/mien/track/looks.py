@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numba import njit
@@ -13,12 +13,12 @@ from numba import njit
 from mien.arrays import Array, Float, Int
 from mien.numeric.threads import for_row_bands
 from mien.track.bands import band_pass, odd
-from mien.track.drawing import Drawing, draw
+from mien.track.drawing import Drawing, Lens, draw, lens_of
 from mien.track.equations import Equations, sum_up
 from mien.track.face import Anchor, TrackedFace
-from mien.track.flows import POSE_UNKNOWNS, Flows, lens_of, screen_flows
+from mien.track.flows import POSE_UNKNOWNS, Flows, screen_flows
 from mien.track.guess import Guess
-from mien.track.samples import Answers, Lens, Moved, Samples, look_up, take_samples
+from mien.track.samples import Answers, Moved, Samples, look_up, take_samples
 from mien.track.views import View
 
 BAND = 0.2
@@ -37,6 +37,10 @@ class Pictures(NamedTuple):
     mask: Float[Array, "h w"]
     drawn: Float[Array, "h w"]
     target: Float[Array, "h w"]
+
+
+Compared = tuple[Float[Array, "h w k"], Float[Array, "h w"], Float[Array, "h w"]]
+"""Layers, their mixture and the target, plain or filtered alike."""
 
 
 @dataclass(frozen=True)
@@ -103,29 +107,17 @@ Linearize = Callable[[Scene, Guess], Look]
 def by_plain_pictures(scene: Scene, guess: Guess) -> Look:
     """Equations of the pose alone, analytic; rows of the face's parameters are 0."""
     drawing = scene.draw(guess, layers=False)
-    weights = scene.weights * drawing.mask
-    answers = scene.model.pose_answers
-    drawn = (drawing.luma, scene.target, weights, drawing.layers)
-    lens = lens_of(scene.view, guess.pose)
-    samples = take_samples(drawing, *drawn, answers, lens, scale=scene.scale)
-    return _Sampled(scene, guess, drawing, samples, answers)
+    shown = (drawing.layers, drawing.luma, scene.target)
+    return _Sampled.of(scene, guess, drawing, shown, scene.model.pose_answers)
 
 
 def by_bands(scene: Scene, guess: Guess) -> Look:
     """Equations of pose and face, analytic, over band-pass filtered pictures."""
     drawing = scene.draw(guess, layers=True)
-    layers, drawn, target = banded(scene, drawing)
-    answers = scene.model.answers
-    weights = scene.weights * drawing.mask
-    lens = lens_of(scene.view, guess.pose)
-    shown = (drawn, target, weights, layers)
-    samples = take_samples(drawing, *shown, answers, lens, scale=scene.scale)
-    return _Sampled(scene, guess, drawing, samples, answers)
+    return _Sampled.of(scene, guess, drawing, banded(scene, drawing), scene.model.answers)
 
 
-def banded(
-    scene: Scene, drawing: Drawing
-) -> tuple[Float[Array, "h w k"], Float[Array, "h w"], Float[Array, "h w"]]:
+def banded(scene: Scene, drawing: Drawing) -> Compared:
     """Layers, their mixture and the target, band-pass filtered."""
     shown = (drawing.layers, drawing.luma, scene.target)
     return band_pass(*shown, drawing.mask, scene.weights, odd(BAND * scene.face_px))
@@ -140,6 +132,15 @@ class _Sampled:
     drawing: Drawing
     samples: Samples
     answers: Answers
+
+    @classmethod
+    def of(
+        cls, scene: Scene, guess: Guess, drawing: Drawing, shown: Compared, answers: Answers
+    ) -> Self:
+        """Of a drawing as it is compared."""
+        lens = lens_of(scene.view, guess.pose)
+        samples = take_samples(drawing, *shown, scene.weights, answers, lens, scale=scene.scale)
+        return cls(scene, guess, drawing, samples, answers)
 
     def equations(self, guess: Guess) -> Equations:
         if guess is self.guess:
@@ -200,12 +201,7 @@ def _picture_rows(
     target: Array,
 ) -> None:
     # Unpacked: to look at an array in a tuple, pixel by pixel, takes half as long again.
-    ids, barycentrics, luma, layers = (
-        drawing.ids,
-        drawing.barycentrics,
-        drawing.luma,
-        drawing.layers,
-    )
+    ids, barycentrics, _, _, _, layers, luma = drawing
     masks, triangles = answers.masks, answers.triangles
     focal, cx, cy = lens
     height, width = plain.shape

@@ -13,7 +13,7 @@ from numba import njit
 
 from mien.arrays import Array, Float, Int
 from mien.numeric.threads import for_row_bands
-from mien.track.drawing import Drawing
+from mien.track.drawing import Drawing, Lens
 
 
 class Answers(NamedTuple):
@@ -72,16 +72,12 @@ class Samples(NamedTuple):
     scale: float
 
 
-Lens = tuple[float, float, float]
-"""Focal length and principal point, px."""
-
-
 def take_samples(
     drawing: Drawing,
+    layers: Float[Array, "h w k"],
     drawn: Float[Array, "h w"],
     target: Float[Array, "h w"],
     weights: Float[Array, "h w"],
-    layers: Float[Array, "h w k"],
     answers: Answers,
     lens: Lens,
     *,
@@ -90,7 +86,7 @@ def take_samples(
     """Samples of a drawing.
 
     Args:
-        drawn, target: luma, plain or filtered; layers: the expressions' pictures, likewise.
+        layers: the expressions' pictures, plain or filtered; drawn, target: luma, likewise.
         weights: of the pixels. lens: of the drawing.
         scale: of Samples.
     """
