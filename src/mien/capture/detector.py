@@ -21,6 +21,9 @@ MIN_EYE_DISTANCE_PX = 20.0
 GOOD_EYE_DISTANCE_PX = 60.0
 """From here on they are good to 1 % of it; more pixels add little."""
 
+SMALL = 0.15
+"""A face narrower than this share of a frame's longer side is looked at again from near by."""
+
 NO_FACE = (
     "no face found; one must look within about 50 degrees of the camera and fill a twentieth of "
     "the photo's width"
@@ -143,6 +146,16 @@ class LandmarkDetector:
             shift = float(np.median(offsets)) / _eye_distance(near)
         sight = _Sight(near or chosen, shift, quarters, notes)
         return _turned_back(sight, pixels.shape[1], pixels.shape[0])
+
+
+def look_twice(detector: LandmarkDetector, pixels: UInt8[Array, "h w 3"]) -> DetectedFace | None:
+    """The largest face, upright; one that is small is looked at again from near by."""
+    found = detector.detect_fast(pixels)
+    if found is None or found.width > SMALL * max(pixels.shape[:2]):
+        return found
+    crop, left, top = _around(pixels, found)
+    near = detector.detect_fast(np.ascontiguousarray(crop))
+    return found if near is None else _moved(near, 1.0, (left, top))
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,14 @@ pose."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from mien.arrays import Array, Float, Int
-from mien.capture.mediapipe_face import BLENDSHAPE_NAMES
+from mien.capture.mediapipe_face import BLENDSHAPE_NAMES, DetectedFace, yaw_pitch
 
 MAX_YAW = np.radians(50)
 """Past this the detector's landmarks are poor or missing."""
@@ -43,6 +45,19 @@ class FrameScores:
     pose: Float[Array, "n 2"]
     blendshapes: Float[Array, "n 52"]
     lips_apart: Float[Array, " n"]
+
+    @classmethod
+    def of(
+        cls, index: Sequence[int], sharpness: Sequence[float], faces: Sequence[DetectedFace]
+    ) -> Self:
+        """The scores of the faces in these frames."""
+        return cls(
+            np.array(index),
+            np.array(sharpness),
+            np.array([yaw_pitch(face.R_cam_head) for face in faces]),
+            np.array([face.blendshapes for face in faces]),
+            np.array([face.lips_apart for face in faces]),
+        )
 
 
 def choose_frames(scores: FrameScores, count: int) -> Int[Array, " m"]:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from mien.arrays import Array, Int, UInt8, check_positive
+from mien.arrays import Array, Int, check_positive
 from mien.capture.detector import LandmarkDetector
 from mien.capture.expression_choice import choose_expressions, name_expressions
 from mien.capture.folder import NEUTRAL
 from mien.capture.frame_choice import FrameScores, choose_frames
-from mien.capture.mediapipe_face import DetectedFace, yaw_pitch
+from mien.capture.frame_photos import fetch_frames
+from mien.capture.mediapipe_face import DetectedFace
 from mien.capture.photos import MAX_SIDE, Photo, shrunk
+from mien.capture.sharpness import face_sharpness
 from mien.capture.video import Video
 from mien.errors import EstimationError
 
@@ -22,8 +24,6 @@ MAX_SAMPLES = 240
 # Just under a tenth, so that rounded times of a 10 Hz clip do not skip frames.
 _SAMPLE_SECONDS = 0.099
 _ANALYSIS_SIDE = 640
-_SHARPNESS_SIDE = 192
-_BLOCK = 8
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def pick_frames(
     scores = _judge(video, detector, report)
     rows = _choose_rows(scores, count, expressions)
     wanted = {int(scores.index[row]) for chosen in rows.values() for row in chosen}
-    photos = dict(_fetch(video, wanted, max_side, report))
+    photos = dict(fetch_frames(video, wanted, max_side, lambda frame: report(1, frame)))
     picked = {
         name: tuple(photos[index] for index in scores.index[chosen].tolist() if index in photos)
         for name, chosen in rows.items()
@@ -124,64 +124,13 @@ def _judge(
             continue
         due = frame.seconds + step
         pixels = frame.pixels()
-        found = detector.detect_fast(shrunk(pixels, _ANALYSIS_SIDE))
+        small = shrunk(pixels, _ANALYSIS_SIDE)
+        found = detector.detect_fast(small)
         if found is not None:
-            rows.append((frame.index, _sharpness(pixels, found), found))
+            points = found.points[:, :2] * (max(pixels.shape) / max(small.shape))
+                max(pixels.shape) / min(max(pixels.shape), _ANALYSIS_SIDE)
+            )
+            rows.append((frame.index, face_sharpness(pixels, points), found))
     if not rows:
         raise EstimationError(f"{video.path}: no face found in any of its frames")
-    faces = [face for _, _, face in rows]
-    return FrameScores(
-        np.array([index for index, _, _ in rows]),
-        np.array([sharpness for _, sharpness, _ in rows]),
-        np.array([yaw_pitch(face.R_cam_head) for face in faces]),
-        np.array([face.blendshapes for face in faces]),
-        np.array([face.lips_apart for face in faces]),
-    )
-
-
-def _sharpness(pixels: UInt8[Array, "h w 3"], face: DetectedFace) -> float:
-    """Variance of the Laplacian over the face, at one size for all and free of contrast, less where
-    the edges are those of the coder's blocks."""
-    import cv2
-
-    factor = max(pixels.shape) / min(max(pixels.shape), _ANALYSIS_SIDE)
-    low = np.maximum(face.points[:, :2].min(axis=0) * factor, 0).astype(int)
-    high = np.ceil(face.points[:, :2].max(axis=0) * factor).astype(int)
-    crop = shrunk(pixels[low[1] : high[1], low[0] : high[0]], _SHARPNESS_SIDE)
-    if crop.size == 0:
-        return 0.0
-    grey = cv2.cvtColor(np.ascontiguousarray(crop), cv2.COLOR_RGB2GRAY).astype(np.float64)
-    sharpness = float(cv2.Laplacian(grey, cv2.CV_64F).var() / (grey.var() + 1.0))
-    return sharpness / _blockiness(pixels) ** 2
-
-
-def _blockiness(pixels: UInt8[Array, "h w 3"]) -> float:
-    """How much larger steps are at the borders of 8x8 blocks than inside: 1 where none shows.
-
-    The first frames of a clip are often coded so coarsely that blocks are most of what they show.
-    """
-    grey = pixels[..., 1].astype(np.float32)
-    ratios = []
-    for image in (grey, grey.T):
-        steps = np.abs(np.diff(image, axis=1)).mean(axis=0)
-        border = np.arange(len(steps)) % _BLOCK == _BLOCK - 1
-        if border.any():
-            ratios.append(float(steps[border].mean() / max(float(steps[~border].mean()), 1e-3)))
-    return max(1.0, float(np.mean(ratios or [1.0])))
-
-
-def _fetch(
-    video: Video, wanted: set[int], max_side: int, report: Callable[[int, int], None]
-) -> Iterator[tuple[int, Photo]]:
-    """The wanted frames as photos, with their numbers."""
-    last = max(wanted)
-    for frame in video.frames():
-        report(1, frame.index)
-        if frame.index in wanted:
-            pixels = frame.pixels()
-            size = pixels.shape[1], pixels.shape[0]
-            name = f"frame_{frame.index:06d}.png"
-            photo = Photo(name, video.path, shrunk(pixels, max_side), original_size=size)
-            yield frame.index, photo
-        if frame.index == last:
-            return
+    return FrameScores.of(*zip(*rows, strict=True))

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
-from mien.capture.detector import LandmarkDetector
+from mien.capture.detector import LandmarkDetector, look_twice
 from mien.capture.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace
 from mien.errors import EstimationError
 from mien.expressions.followers import part_vertices
@@ -22,9 +20,6 @@ from mien.track.marks import measure_marks
 from mien.track.meant import Pictures
 from mien.track.state import Layout, TrackState
 
-SMALL = 0.15
-"""A face narrower than this share of the picture's longer side is looked at again from near by."""
-_CROP_WIDTHS = 1.5
 _MOST_WEIGHT = 1.5
 _IRISES = [LEFT_IRIS, RIGHT_IRIS]
 _LIDS = np.array([[386, 374], [159, 145]])
@@ -66,16 +61,7 @@ class Starter:
 
     def look(self, pixels: UInt8[Array, "h w 3"]) -> DetectedFace | None:
         """The largest face; one that is small is looked at twice."""
-        found = self._detector.detect_fast(pixels)
-        if found is None or found.width > SMALL * max(pixels.shape[:2]):
-            return found
-        middle = found.points[:, :2].mean(axis=0)
-        left, top = np.maximum(middle - _CROP_WIDTHS * found.width / 2, 0).astype(int)
-        side = int(_CROP_WIDTHS * found.width)
-        crop = np.ascontiguousarray(pixels[top : top + side, left : left + side])
-        near = self._detector.detect_fast(crop)
-        corner = np.array([left, top, 0])
-        return found if near is None else replace(near, points=near.points + corner)
+        return look_twice(self._detector, pixels)
 
     def fit(
         self, face: DetectedFace, *, size: tuple[int, int], focal_px: float
