@@ -74,6 +74,12 @@ def test_bad_examples(photo, points, message):
         Example("joy", photo, points, "joy.png")
 
 
+def test_teeth_are_of_examples_that_there_are(example_set):
+    assert replace(example_set, teeth=(1,)).teeth == (1,)
+    with pytest.raises(InputError, match="teeth: expected the index of one of 2 examples, got 2"):
+        replace(example_set, teeth=(0, 2))
+
+
 def test_at_least_one(example_set):
     with pytest.raises(InputError, match="at least one, the neutral face"):
         replace(example_set, examples=())

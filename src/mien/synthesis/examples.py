@@ -53,9 +53,11 @@ class ExampleSet:
         statistics: (N, n, 2) geometries, px of the neutral photo, of all frames that feed the point
             statistics; may be more than the examples.
         subregions: over the standard example's photo.
-    Raises: InputError: no example, two of one name, points of another layout, no such `standard`,
-        subregions that are drawn over a picture of another size.
-    Source: Z06 section 5.
+        teeth: the examples that the teeth are made from; all where none is named. Those with a
+            closed mouth have none to show.
+    Raises: InputError: no example, two of one name, points of another layout, no such `standard`
+        or teeth, subregions that are drawn over a picture of another size.
+    Source: Z06 sections 5 and 8.
     """
 
     layout: FeatureLayout
@@ -63,6 +65,7 @@ class ExampleSet:
     standard: int
     statistics: Float[Array, "N n 2"]
     subregions: Subregions
+    teeth: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that all parts speak of the same points."""
@@ -75,9 +78,9 @@ class ExampleSet:
         twice = [name for name, times in names.items() if times > 1]
         if twice:
             raise InputError("examples", "names of their own", f"{twice[0]!r} twice")
-        if not 0 <= self.standard < len(self.examples):
-            expected = f"the index of one of {len(self.examples)} examples"
-            raise InputError("standard", expected, self.standard)
+        for name, row in (("standard", self.standard), *(("teeth", row) for row in self.teeth)):
+            if not 0 <= row < len(self.examples):
+                raise InputError(name, f"the index of one of {len(self.examples)} examples", row)
         size = self.examples[self.standard].photo.shape[:2]
         check_array("fades", self.subregions.fades, (*size, None), dtype=np.float32)
         statistics = check_array("statistics", self.statistics, (None, count, 2))
