@@ -1,0 +1,180 @@
+"""A person's expressions from feature points: completed, mixed and drawn."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from mien.arrays import Array, Float, Int, UInt8, frozen
+from mien.errors import InputError
+from mien.synthesis.coefficients import coefficients
+from mien.synthesis.compose import Composer
+from mien.synthesis.conditional import ConditionalMotion
+from mien.synthesis.examples import ExampleSet
+from mien.synthesis.inferred import Inference, check_known
+from mien.synthesis.motion import PlanarMotion, compensated, estimate_planar_motion
+from mien.synthesis.propagate import Propagation
+
+__all__ = ["LEAST_TELLING", "PropagationName", "Synthesis", "SynthesisOptions", "Synthesizer"]
+
+PropagationName = Literal["closed-form", "printed"]
+
+LEAST_TELLING = 3
+"""So many points tell how the head moved; two would follow any motion and say nothing else."""
+
+_REMEMBERED = 8
+
+
+@dataclass(frozen=True)
+class SynthesisOptions:
+    """What differs from the paper can be switched off, one by one or by `paper`.
+
+    Attributes:
+        distance_penalty, slack, together: as for `coefficients`.
+        propagation: how all points come from some: "closed-form" is the one that was measured
+            better, "printed" the paper's.
+    Raises: InputError: another name of a propagation.
+    """
+
+    distance_penalty: float = 0.02
+    slack: float = 0.0
+    together: Sequence[Collection[str]] = ()
+    propagation: PropagationName = "closed-form"
+
+    def __post_init__(self) -> None:
+        """Check the name."""
+        names = get_args(PropagationName)
+        if self.propagation not in names:
+            raise InputError("propagation", " or ".join(names), self.propagation)
+
+    @classmethod
+    def paper(cls) -> SynthesisOptions:
+        """Exactly what Z06 prints."""
+        return cls(distance_penalty=0.0, slack=0.0, together=(), propagation="printed")
+
+
+@dataclass(frozen=True)
+class Synthesis:
+    """A picture of an expression, and what it was made from.
+
+    Attributes:
+        image: (h, w, 3) sRGB.
+        points: (n, 2) px of it.
+        coefficients: (R, m) share of each example in each subregion; rows sum to 1.
+        hull_px: (R,) root of the mean squared distance of each subregion's points, px of the
+            neutral photo, from those of the mix that it was made from: what no mix of the
+            examples reaches. On a clip it is at most 0.2 px more than `hull_distances`.
+    """
+
+    image: UInt8[Array, "h w 3"]
+    points: Float[Array, "n 2"]
+    coefficients: Float[Array, "r m"]
+    hull_px: Float[Array, " r"]
+
+
+class Synthesizer:
+    """Draws a person's expressions from feature points; made once, used for many pictures.
+
+    Args:
+        examples: of the person.
+        options: beyond the paper or not.
+    Raises: InputError: as `Composer`.
+    Source: Z06 sections 6, 7, 10.
+    """
+
+    def __init__(self, examples: ExampleSet, options: SynthesisOptions | None = None) -> None:
+        self.examples = examples
+        self.options = options or SynthesisOptions()
+        self._composer = Composer(examples)
+        self._inferences: OrderedDict[bytes, Inference] = OrderedDict()
+
+    def complete(
+        self, known: Int[Array, " k"], positions: Float[Array, "k 2"]
+    ) -> Float[Array, "n 2"]:
+        """Where all points are, given where some are.
+
+        How the head moved is told by the known points, both here and in the expressions that are
+        learned from. One or two cannot tell it: then the head is where the neutral photo has it.
+        The first call for a set of known points takes longer than those that follow.
+
+        Args:
+            known: indices of points, none twice.
+            positions: (k, 2) px of the neutral photo.
+        Returns: (n, 2) px of the neutral photo; the known points exactly where they were given.
+        Raises: InputError: no points, unknown or repeated ones, shapes, NaN, fewer than two
+            expressions to learn from. EstimationError: all points in one place.
+        Source: Z06 sections 10 and 12.
+        """
+        neutral = self.examples.neutral.points
+        known, positions = check_known(known, positions, len(neutral))
+        told = len(known) >= LEAST_TELLING
+        motion = estimate_planar_motion(neutral[known], positions) if told else None
+        still = positions if motion is None else motion.undo(positions)
+        inferred = self._inference(known, told).infer(known, still - neutral[known])
+        completed = neutral + inferred.displacements
+        if motion is not None:
+            completed = motion(completed)
+        completed[known] = positions
+        return completed
+
+    def synthesize(
+        self,
+        points: Float[Array, "n 2"],
+        *,
+        motion: PlanarMotion | None = None,
+        size: tuple[int, int] | None = None,
+        out: UInt8[Array, "h w 3"] | None = None,
+    ) -> Synthesis:
+        """The picture of an expression, all of whose points are known.
+
+        Args:
+            points: (n, 2) px of the picture; they may lie outside.
+            motion: of the head, from the neutral photo to the picture; none unless given.
+            size: width and height of the picture, px; the neutral photo's unless given.
+            out: memory to draw into.
+        Raises: InputError: shapes, NaN. EstimationError: all points in one place.
+        Source: Z06 sections 6 and 7.
+        """
+        shares = coefficients(
+            self.examples,
+            points,
+            distance_penalty=self.options.distance_penalty,
+            slack=self.options.slack,
+            together=self.options.together,
+        )
+        place: dict[str, Any] = {"motion": motion, "size": size}
+        given = {name: value for name, value in place.items() if value is not None}
+        image = self._composer.render(points, shares, out=out, **given)
+        missed = _missed(self.examples, points, shares)
+        return Synthesis(image, frozen(np.array(points, float)), frozen(shares), frozen(missed))
+
+    def _inference(self, known: Int[Array, " k"], told: bool) -> Inference:
+        """What completes this set of points; the latest few sets are remembered."""
+        key = known.astype(np.int64).tobytes()
+        if key not in self._inferences:
+            self._inferences[key] = self._learned(known if told else None)
+        self._inferences.move_to_end(key)
+        if len(self._inferences) > _REMEMBERED:
+            self._inferences.popitem(last=False)
+        return self._inferences[key]
+
+    def _learned(self, by: Int[Array, " k"] | None) -> Inference:
+        neutral = self.examples.neutral.points
+        geometries, _ = compensated(self.examples.statistics, neutral, by=by)
+        if self.options.propagation == "printed":
+            return Propagation(self.examples.layout, geometries - neutral)
+        return ConditionalMotion(geometries - neutral)
+
+
+def _missed(
+    examples: ExampleSet, points: Float[Array, "n 2"], shares: Float[Array, "r m"]
+) -> Float[Array, " r"]:
+    """How far each subregion's points are from where the mix of examples has them."""
+    apart = examples.geometries - examples.geometry(points)
+    parts = zip(shares, examples.subregions.members, strict=True)
+    rows = [np.tensordot(row, apart[:, members], axes=1) for row, members in parts]
+    return np.array([np.sqrt((row**2).sum(axis=1).mean()) for row in rows])
