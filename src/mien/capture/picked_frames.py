@@ -128,8 +128,6 @@ def _judge(
         found = detector.detect_fast(small)
         if found is not None:
             points = found.points[:, :2] * (max(pixels.shape) / max(small.shape))
-                max(pixels.shape) / min(max(pixels.shape), _ANALYSIS_SIDE)
-            )
             rows.append((frame.index, face_sharpness(pixels, points), found))
     if not rows:
         raise EstimationError(f"{video.path}: no face found in any of its frames")
