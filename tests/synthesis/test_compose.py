@@ -11,6 +11,7 @@ from mien.assets.subregions import default_subregions
 from mien.errors import InputError
 from mien.synthesis.compose import Composer
 from mien.synthesis.examples import Example, ExampleSet
+from mien.synthesis.motion import PlanarMotion
 
 WIDTH, HEIGHT, COUNT = 240, 300, 4
 MATRIX, SHIFT = np.array([[0.98, 0.05], [-0.03, 1.02]]), np.array([2.0, -3.0])
@@ -63,12 +64,32 @@ def shares(example_set, row):
     return np.tile(np.asarray(row, float), (len(example_set.subregions.names), 1))
 
 
-def core(example_set):
-    """Where the standard image is all face, well inside."""
+def similarity(a, b, x, y):
+    return PlanarMotion(np.array(a), np.array(b), np.array([x, y], float))
+
+
+def grown(mask, by):
+    """By some pixels on all sides; below 0, shrunk."""
     import cv2
 
-    whole = np.uint8(example_set.subregions.fades.sum(2) > 1 - 1e-6)
-    return cv2.erode(whole, np.ones((15, 15), np.uint8), borderValue=0) > 0
+    kernel = np.ones((2 * abs(by) + 1,) * 2, np.uint8)
+    change = cv2.dilate if by > 0 else cv2.erode
+    return change(np.uint8(mask), kernel, borderType=cv2.BORDER_CONSTANT, borderValue=0) > 0
+
+
+def meshed(example_set):
+    """The pixels within the triangulation's frame around the neutral face."""
+    import cv2
+
+    frame = example_set.layout.frame(example_set.neutral.points)
+    mask = np.zeros((HEIGHT, WIDTH), np.uint8)
+    cv2.fillPoly(mask, [np.int32(np.round(frame))], 1)
+    return mask > 0
+
+
+def core(example_set):
+    """Where the standard image is all face, well inside."""
+    return grown(example_set.subregions.fades.sum(2) > 1 - 1e-6, -7)
 
 
 def test_neutral_at_its_own_points_is_its_photo(noisy):
@@ -79,17 +100,64 @@ def test_neutral_at_its_own_points_is_its_photo(noisy):
 @pytest.mark.parametrize("index", range(COUNT))
 def test_an_examples_own_points_give_that_example(noisy, index):
     example = noisy.examples[index]
-    image = Composer(noisy).render(example.points, shares(noisy, np.eye(COUNT)[index]))
+    composer = Composer(noisy)
+    own, motion = shares(noisy, np.eye(COUNT)[index]), composer.head_motion(example.points)
+    image = composer.render(example.points, own, motion=motion)
     inside = core(noisy)
     assert inside.mean() > 0.1
     assert psnr(image[inside], example.photo[inside]) > 40
 
 
-def test_outside_of_the_face_the_neutral_photo_stays(noisy):
-    image = Composer(noisy).render(noisy.neutral.points, shares(noisy, [0, 1, 0, 0]))
-    for corner in (np.s_[:8, :8], np.s_[:8, -8:], np.s_[-8:, :8], np.s_[-8:, -8:]):
-        np.testing.assert_array_equal(image[corner], noisy.neutral.photo[corner])
+@pytest.mark.parametrize("motion", [None, similarity(1, 0, 0, 0)])
+def test_outside_of_the_mesh_the_neutral_photo_stays(noisy, motion):
+    points = noisy.neutral.points + np.random.default_rng(4).normal(0, 2, (1, 2))
+    image = Composer(noisy).render(points, shares(noisy, [0, 1, 0, 0]), motion=motion)
+    outside = ~grown(meshed(noisy), 2)
+    assert outside.any()
+    np.testing.assert_array_equal(image[outside], noisy.neutral.photo[outside])
     assert (image != noisy.neutral.photo).any()
+
+
+def test_around_the_subregions_the_neutral_photo_follows_the_mesh(layout):
+    """Examples are black: what is not, is neutral; it moves as the points next to it do."""
+    black = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    example_set = made(layout, [rounded(painted(centres())), black])
+    neutral = example_set.neutral.points
+    image = Composer(example_set).render(neutral + np.array([6, 0]), shares(example_set, [0, 1]))
+    off_face = grown(example_set.subregions.fades.sum(2) > 0, 8)
+    ring = grown(meshed(example_set), -2) & ~off_face
+    assert ring.any()
+    assert (image[ring] != example_set.neutral.photo[ring]).any()
+    # Smooth, so that what moved by 0 to 6 px is near, and nothing is black.
+    steps = np.abs(painted(centres() - [6, 0]) - painted(centres())).max()
+    assert np.abs(image[ring].astype(float) - painted(centres())[ring]).max() < steps + 2
+
+
+def test_a_moved_picture_is_the_unmoved_one_moved(noisy):
+    """By whole pixels exactly."""
+    rng = np.random.default_rng(5)
+    points = noisy.neutral.points + rng.normal(0, 1, noisy.neutral.points.shape)
+    coefficients = rng.dirichlet(np.ones(COUNT), len(noisy.subregions.names))
+    composer, size = Composer(noisy), (WIDTH + 40, HEIGHT + 30)
+    still = composer.render(points, coefficients)
+    moved = composer.render(
+        points + np.array([17, 9]), coefficients, motion=similarity(1, 0, 17, 9), size=size
+    )
+    np.testing.assert_array_equal(moved[9 : 9 + HEIGHT, 17 : 17 + WIDTH], still)
+    # Beyond its edges the photo goes on.
+    np.testing.assert_array_equal(moved[:9], np.broadcast_to(moved[9], (9, *moved[9].shape)))
+
+
+@pytest.mark.parametrize("motion", [similarity(1, 0, 0.5, -0.25), similarity(1.1, 0.2, 31, -33)])
+def test_the_picture_moves_with_the_head(layout, motion):
+    """Mesh and background show the same motion, and meet."""
+    example_set = made(layout, [rounded(painted(centres()))])
+    points = motion(example_set.neutral.points)
+    image = Composer(example_set).render(points, shares(example_set, [1]), motion=motion)
+    back = motion.undo(centres())
+    seen = ((back > 1) & (back < [WIDTH - 1, HEIGHT - 1])).all(2)
+    assert seen.mean() > 0.7
+    assert np.abs(image[seen] - painted(back)[seen]).max() < 2.5
 
 
 def test_an_affine_motion_of_all_points_is_that_of_the_picture(layout):
@@ -143,10 +211,18 @@ def test_draws_into_memory_that_is_there(noisy):
     np.testing.assert_array_equal(out, Composer(noisy).render(noisy.neutral.points, coefficients))
 
 
-def test_points_outside_of_the_photo_are_no_harm(noisy):
+def test_a_face_outside_of_the_picture_is_no_harm(noisy):
+    motion = similarity(1, 0, WIDTH, 40)
+    points = noisy.neutral.points + np.array([2 * WIDTH, 40])
+    image = Composer(noisy).render(points, shares(noisy, [0, 0, 1, 0]), motion=motion)
+    edge = noisy.neutral.photo[:-40, :1]
+    np.testing.assert_array_equal(image[40:, :20], np.repeat(edge, 20, axis=1))
+
+
+def test_points_that_leave_the_frame_are_no_harm(noisy):
     points = noisy.neutral.points + np.array([WIDTH, 0.6 * HEIGHT])
     image = Composer(noisy).render(points, shares(noisy, [0, 0, 1, 0]))
-    np.testing.assert_array_equal(image[:50, :50], noisy.neutral.photo[:50, :50])
+    np.testing.assert_array_equal(image[:20, :20], noisy.neutral.photo[:20, :20])
 
 
 def test_bad_input_is_named(noisy):
@@ -162,6 +238,10 @@ def test_bad_input_is_named(noisy):
         composer.render(points, 2 * good)
     with pytest.raises(InputError, match="out"):
         composer.render(points, good, out=np.empty((3, 3, 3), np.uint8))
+    with pytest.raises(InputError, match="size"):
+        composer.render(points, good, size=(0, 5))
+    with pytest.raises(InputError, match="out: expected a writable 7x5 image"):
+        composer.render(points, good, size=(7, 5), out=np.empty_like(noisy.neutral.photo))
     with pytest.raises(InputError, match="skip"):
         Composer(noisy, skip=-1)
 

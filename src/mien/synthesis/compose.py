@@ -14,10 +14,11 @@ from mien.numeric.threads import for_row_bands
 from mien.numeric.warp import corner_places, place
 from mien.render.mipmap import UNIT, packed_texels, spread_texel
 from mien.synthesis.examples import ExampleSet
+from mien.synthesis.motion import PlanarMotion, estimate_planar_motion
 
 __all__ = ["Composer"]
 
-_MIXED, _NONE = -1, -2
+_MIXED = -1
 
 
 class _Photos(NamedTuple):
@@ -30,7 +31,10 @@ class _Photos(NamedTuple):
 
 
 class _Mixtures(NamedTuple):
-    """Shares (R, m) float32 of the subregions, those that count in the first `counts` (R,)."""
+    """Shares (R + 1, m) float32 of the subregions, those that count in the first `counts`.
+
+    The last row is that of the surroundings, which are the neutral example's.
+    """
 
     shares: Float[Array, "r m"]
     used: Int[Array, "r m"]
@@ -39,11 +43,13 @@ class _Mixtures(NamedTuple):
 
 
 class Composer:
-    """Draws expressions of one person over the neutral photo.
+    """Draws expressions of one person into the neutral photo.
 
     Where the paper aligns examples to the standard image, mixes there and warps the mixture to
     the new points (Z06 sections 6 and 7), each photo is looked up here where the target's pixel
     lies in it, and the shares are looked up in the standard image: colours are resampled once.
+    Around the subregions, out to the triangulation's frame, the neutral photo is looked up in the
+    same way: hair and neck follow the jaw. From the frame on it moves with the head.
 
     Args:
         examples: photos, their points and the subregions.
@@ -55,42 +61,58 @@ class Composer:
     def __init__(self, examples: ExampleSet, *, skip: float = 1 / 256) -> None:
         if not 0 <= skip < 1:
             raise InputError("skip", "a share from 0 to below 1", skip)
-        self._layout, self._skip = examples.layout, float(skip)
-        self._background = np.ascontiguousarray(examples.neutral.photo)
+        layout = examples.layout
+        self._layout, self._skip = layout, float(skip)
+        self._neutral, self._neutral_points = examples.neutral.photo, examples.neutral.points
+        self._frame = frozen(layout.frame(self._neutral_points))
         self._photos = _packed([example.photo for example in examples.examples])
-        framed = np.stack([self._framed(example.points) for example in examples.examples])
-        self._corners = corner_places(framed, examples.layout.triangles)
-        self._triangles = frozen(np.ascontiguousarray(examples.layout.triangles, np.int32))
+        places = [example.points for example in examples.examples]
+        framed = np.stack([self._framed(points, self.head_motion(points)) for points in places])
+        self._corners = corner_places(framed, layout.triangles)
+        self._triangles = frozen(np.ascontiguousarray(layout.triangles, np.int32))
         self._standard = examples.standard
-        self._fades = frozen(np.ascontiguousarray(examples.subregions.fades, np.float32))
+        self._fades = _with_surroundings(examples.subregions.fades)
         self._blocks = _blocks(self._fades)
+
+    def head_motion(self, points: Float[Array, "n 2"]) -> PlanarMotion:
+        """What the head did between the neutral photo and another, from points that are rigid.
+
+        Args:
+            points: (n, 2) px of the other photo.
+        Raises: InputError: shape, NaN. EstimationError: rigid points in one place.
+        Source: Z06 eq. (8), (9). All points would take an open jaw for a head that nods.
+        """
+        points = check_array("points", points, self._neutral_points.shape)
+        rigid = self._layout.rigid
+        return estimate_planar_motion(self._neutral_points[rigid], points[rigid])
 
     def render(
         self,
         points: Float[Array, "n 2"],
         coefficients: Float[Array, "r m"],
         *,
+        motion: PlanarMotion | None = None,
+        size: tuple[int, int] | None = None,
         out: UInt8[Array, "h w 3"] | None = None,
     ) -> UInt8[Array, "h w 3"]:
-        """The expression over the neutral photo, whose pixels outside of the face stay.
+        """The expression in the neutral photo.
 
         Args:
-            points: (n, 2) px of the neutral photo; they may lie outside.
+            points: (n, 2) px of the picture; they may lie outside.
             coefficients: (R, m) shares of the examples in each subregion; rows sum to 1.
+            motion: of the head, from the neutral photo to the picture; none unless given.
+            size: width and height of the picture; the neutral photo's unless given. Beyond its
+                edges the neutral photo goes on as it is there.
             out: memory to draw into.
-        Returns: (h, w, 3) sRGB of the neutral photo's size; the same in any number of threads.
+        Returns: (h, w, 3) sRGB; the same in any number of threads.
         Raises: InputError: shapes, NaN, rows that do not sum to 1.
-        Source: Z06 eq. (6), (7).
+        Source: Z06 eq. (6), (7), (8).
         """
-        points = check_array("points", points, (len(self._layout.names), 2))
+        points = check_array("points", points, self._neutral_points.shape)
         mixtures = self._mixtures(coefficients)
-        height, width = self._background.shape[:2]
-        if out is None:
-            out = np.empty_like(self._background)
-        fits = out.shape == self._background.shape and out.dtype == np.uint8
-        if not (fits and out.flags.c_contiguous and out.flags.writeable):
-            raise InputError("out", f"a writable {width}x{height} image", f"{out.shape}")
-        placed = frozen(np.ascontiguousarray(self._framed(points)))
+        placed = frozen(self._framed(points, motion))
+        out = self._background(motion, size, out)
+        height, width = out.shape[:2]
         nearness, raster = frozen(np.ones(len(placed))), unfilled(width, height)
         drawn = (raster.triangle_ids, raster.barycentrics)
 
@@ -99,32 +121,64 @@ class Composer:
                 placed, nearness, self._triangles, False, first, end, *drawn, raster.depth
             )
             faces = (self._corners, self._standard, self._fades, self._blocks, self._photos)
-            _compose_rows(*drawn, *faces, mixtures, self._skip, self._background, first, end, out)
+            _compose_rows(*drawn, *faces, mixtures, first, end, out)
 
         for_row_bands(rows, height, work=4 * width * height)
         return out
 
-    def _framed(self, points: Float[Array, "n 2"]) -> Float[Array, "k 2"]:
-        return np.concatenate([points, self._layout.frame(points)])
+    def _framed(
+        self, points: Float[Array, "n 2"], motion: PlanarMotion | None
+    ) -> Float[Array, "k 2"]:
+        """All corners of the triangles: where the neutral photo's frame goes, expressions end."""
+        frame = self._frame if motion is None else motion(self._frame)
+        return np.concatenate([points, frame])
+
+    def _background(
+        self,
+        motion: PlanarMotion | None,
+        size: tuple[int, int] | None,
+        out: UInt8[Array, "h w 3"] | None,
+    ) -> UInt8[Array, "h w 3"]:
+        """The neutral photo moved with the head, in memory of its own unless some is given."""
+        import cv2
+
+        width, height = size or self._neutral.shape[1::-1]
+        if min(width, height) < 1:
+            raise InputError("size", "a width and height of at least 1", size)
+        if out is None:
+            out = np.empty((height, width, 3), np.uint8)
+        fits = out.shape == (height, width, 3) and out.dtype == np.uint8
+        if not (fits and out.flags.c_contiguous and out.flags.writeable):
+            raise InputError("out", f"a writable {width}x{height} image", f"{out.shape}")
+        if motion is None and out.shape == self._neutral.shape:
+            np.copyto(out, self._neutral)
+            return out
+        # OpenCV counts from the centre of the first pixel.
+        corners = np.array([[0.5, 0.5], [1.5, 0.5], [0.5, 1.5]])
+        start, right, down = (corners if motion is None else motion(corners)) - 0.5
+        matrix = np.stack([right - start, down - start, start], axis=1)
+        cv2.warpAffine(self._neutral, matrix, (width, height), out, borderMode=cv2.BORDER_REPLICATE)
+        return out
 
     def _mixtures(self, coefficients: Float[Array, "r m"]) -> _Mixtures:
-        shape = (self._fades.shape[2], len(self._photos.starts))
+        shape = (self._fades.shape[2] - 1, len(self._photos.starts))
         shares = check_array("coefficients", coefficients, shape)
         sums = shares.sum(1)
         if np.abs(sums - 1).max() > 1e-3:
             worst = int(np.abs(sums - 1).argmax())
             raise InputError("coefficients", "rows that sum to 1", f"{sums[worst]} in {worst}")
+        shares = np.vstack([shares, np.eye(1, shape[1])])
         kept = np.where(np.abs(shares) > self._skip, shares, 0.0)
         # Where all are small, none is left out.
         empty = np.abs(kept.sum(1)) < 0.5
         kept[empty] = shares[empty]
         kept /= kept.sum(1, keepdims=True)
+        kept /= UNIT
         order = np.argsort(kept == 0, axis=1, kind="stable")
-        weights = np.take_along_axis(kept, order, axis=1) / UNIT
         return _Mixtures(
-            frozen(shares.astype(np.float32)),
+            frozen(kept.astype(np.float32)),
             frozen(order.astype(np.int32)),
-            frozen(weights.astype(np.float32)),
+            frozen(np.take_along_axis(kept, order, axis=1).astype(np.float32)),
             frozen((kept != 0).sum(1).astype(np.int32)),
         )
 
@@ -139,14 +193,19 @@ def _packed(photos: list[UInt8[Array, "h w 3"]]) -> _Photos:
     return _Photos(frozen(texels), frozen(starts), frozen(widths), frozen(heights))
 
 
+def _with_surroundings(fades: Float[Array, "h w r"]) -> Float[Array, "h w r+1"]:
+    """Fades of the subregions and, last, of what is none of them: they sum to 1."""
+    rest = np.maximum(1 - fades.sum(2, keepdims=True), 0)
+    return frozen(np.concatenate([fades, rest], axis=2, dtype=np.float32))
+
+
 def _blocks(fades: Float[Array, "h w r"]) -> Int[Array, "h w"]:
     """Between a pixel and those right of it and below: the subregion that is alone there.
 
-    _NONE outside of the face, _MIXED where there are several.
+    _MIXED where there are several.
     """
     best = fades.argmax(2).astype(np.int16)
-    top, total = fades.max(2), fades.sum(2)
-    codes = np.where(total <= 1e-6, _NONE, np.where(top >= 1 - 1e-6, best, _MIXED)).astype(np.int16)
+    codes = np.where(fades.max(2) >= 1 - 1e-6, best, _MIXED).astype(np.int16)
     wide = np.pad(codes, ((0, 1), (0, 1)), mode="edge")
     others = np.stack([wide[:-1, 1:], wide[1:, :-1], wide[1:, 1:]])
     return frozen(np.where((others == codes).all(0), codes, np.int16(_MIXED)))
@@ -179,45 +238,21 @@ def _look_up(
 
 
 @njit(inline="always")
-def _fades_at(
-    fades: Array, x: np.float32, y: np.float32, shares: Array, weights: Array
-) -> np.float32:
-    """Fill in each example's weight at a place of the standard image; the sum of the fades."""
+def _mix_at(fades: Array, x: np.float32, y: np.float32, shares: Array, weights: Array) -> None:
+    """Fill in each example's weight at a place of the standard image."""
     one = np.float32(1)
     height, width, regions = fades.shape
     col, row = int(x), int(y)
     right, low = np.float32(x - np.float32(col)), np.float32(y - np.float32(row))
     next_col, next_row = min(col + 1, width - 1), min(row + 1, height - 1)
     weights[:] = np.float32(0)
-    inside = np.float32(0)
     for r in range(regions):
         above = (one - right) * fades[row, col, r] + right * fades[row, next_col, r]
         below = (one - right) * fades[next_row, col, r] + right * fades[next_row, next_col, r]
         fade = (one - low) * above + low * below
         if fade > np.float32(0):
-            inside += fade
             for i in range(weights.shape[0]):
                 weights[i] += fade * shares[r, i]
-    return inside
-
-
-@njit(inline="always")
-def _kept(weights: Array, inside: np.float32, skip: float, used: Array, kept: Array) -> int:
-    """How many examples count at a pixel; which and how much of the sum, into used and kept."""
-    count, total = 0, np.float32(0)
-    for i in range(weights.shape[0]):
-        if abs(weights[i]) > skip * inside:
-            used[count], kept[count] = i, weights[i]
-            total += weights[i]
-            count += 1
-    if total < np.float32(0.5) * inside:
-        count, total = weights.shape[0], np.float32(0)
-        for i in range(count):
-            used[i], kept[i] = i, weights[i]
-            total += weights[i]
-    for n in range(count):
-        kept[n] *= inside / (total * np.float32(UNIT))
-    return count
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -230,23 +265,18 @@ def _compose_rows(
     blocks: Array,
     photos: _Photos,
     mixtures: _Mixtures,
-    skip: float,
-    background: Array,
     first: int,
     end: int,
     out: Array,
 ) -> None:
-    """Fill in some rows of the image."""
+    """Fill in what the triangles hold of some rows of the image."""
     half, zero, top = np.float32(0.5), np.float32(0), np.float32(255)
     lane = np.uint64(0x1FFFFF)
     # Unpacked: arrays in tuples are slow to look at.
     texels, starts, widths, heights = photos
     shares, all_used, all_weights, counts = mixtures
     far_x, far_y = np.float32(fades.shape[1] - 1), np.float32(fades.shape[0] - 1)
-    out[first:end] = background[first:end]
     mixed = np.empty(len(starts), np.float32)
-    used, kept = np.empty(len(starts), np.int32), np.empty(len(starts), np.float32)
-    threshold = np.float32(skip)
     for row in range(first, end):
         for col in range(ids.shape[1]):
             t = ids[row, col]
@@ -257,23 +287,17 @@ def _compose_rows(
             x, y = place(corners, t, standard, b0, b1, b2)
             x, y = min(max(x - half, zero), far_x), min(max(y - half, zero), far_y)
             region = blocks[int(y), int(x)]
-            if region == _NONE:
-                continue
-            red, green, blue = half, half, half
             if region == _MIXED:
-                inside = _fades_at(fades, x, y, shares, mixed)
-                if inside <= zero:
-                    continue
-                count = _kept(mixed, inside, threshold, used, kept)
-                rest = max(np.float32(1) - inside, zero)
-                red += rest * background[row, col, 0]
-                green += rest * background[row, col, 1]
-                blue += rest * background[row, col, 2]
+                _mix_at(fades, x, y, shares, mixed)
+                count = len(starts)
             else:
                 count = counts[region]
+            red, green, blue = half, half, half
             for n in range(count):
-                i = used[n] if region == _MIXED else all_used[region, n]
-                weight = kept[n] if region == _MIXED else all_weights[region, n]
+                i = n if region == _MIXED else all_used[region, n]
+                weight = mixed[n] if region == _MIXED else all_weights[region, n]
+                if weight == zero:
+                    continue
                 x, y = place(corners, t, i, b0, b1, b2)
                 colour = _look_up(texels, starts[i], widths[i], heights[i], x, y)
                 red += weight * np.float32(np.int64(colour & lane))
