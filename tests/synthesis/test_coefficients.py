@@ -10,7 +10,13 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import Subregions, default_subregions
 from mien.errors import InputError
-from mien.synthesis.coefficients import UPPER_FACE, coefficients, hull_distances
+from mien.synthesis.coefficients import (
+    UPPER_FACE,
+    coefficients,
+    coefficients_of,
+    distances_of,
+    hull_distances,
+)
 from mien.synthesis.examples import Example, ExampleSet
 from mien.synthesis.motion import PlanarMotion
 
@@ -141,3 +147,19 @@ def test_the_upper_face_is_of_the_subregions_that_ship():
     layout = load_feature_layout()
     drawn = default_subregions(layout, 100 + 200 * layout.template, (320, 400))
     assert set(UPPER_FACE) < set(drawn.names)
+
+
+def test_geometries_in_space_are_mixed_likewise(example_set, rng):
+    examples = rng.normal(size=(5, len(example_set.layout.names), 3))
+    truth = np.array([0.1, 0.5, 0.0, 0.4, 0.0])
+    apart = examples - np.tensordot(truth, examples, axes=1)
+    shares = coefficients_of(apart, example_set.subregions, distance_penalty=0.0)
+    np.testing.assert_allclose(shares, np.tile(truth, (2, 1)), atol=1e-5)
+    np.testing.assert_allclose(distances_of(apart, shares, example_set.subregions), 0, atol=1e-4)
+
+
+def test_distances_are_of_the_points(example_set):
+    apart = np.zeros((1, len(example_set.layout.names), 3))
+    apart[0, example_set.subregions.members[1]] = [0.0, 3.0, 4.0]
+    found = distances_of(apart, np.ones((2, 1)), example_set.subregions)
+    np.testing.assert_allclose(found, [0, 5])

@@ -11,6 +11,7 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.errors import InputError
 from mien.numeric.pca import fit_pca
+from mien.synthesis.conditional import ConditionalMotion
 from mien.synthesis.propagate import Propagation, visiting_order
 from moving import LAYOUT, POINTS, expressions
 
@@ -232,3 +233,19 @@ def test_bad_statistics_are_named(statistics, message):
 def test_a_layout_without_sets_is_refused(rng):
     with pytest.raises(InputError, match="layout: expected at least one set"):
         Propagation(SimpleNamespace(sets=()), expressions(rng), components=4)
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        lambda statistics: ConditionalMotion(statistics, components=4, least_noise=1e-6),
+        lambda statistics: Propagation(LAYOUT, statistics, components=4, **PATIENT),
+    ],
+)
+def test_points_in_space_are_found_likewise(rng, way):
+    """The flat expressions, turned in space, are found as they are in the plane."""
+    statistics = expressions(rng) @ np.linalg.qr(rng.normal(size=(3, 3)))[0][:2]
+    found = way(statistics).infer(KNOWN, statistics[3, KNOWN])
+    np.testing.assert_allclose(found.displacements, statistics[3], atol=1e-5)
+    with pytest.raises(InputError, match=r"displacements: expected shape \(1, 3\)"):
+        way(statistics).infer([0], np.zeros((1, 2)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from mien.errors import InputError
 from mien.numeric.simplex import simplex_least_squares
 from mien.synthesis.examples import ExampleSet
 
-__all__ = ["UPPER_FACE", "coefficients", "hull_distances"]
+__all__ = ["UPPER_FACE", "coefficients", "coefficients_of", "distances_of", "hull_distances"]
 
 UPPER_FACE = (
     "forehead",
@@ -23,6 +24,16 @@ UPPER_FACE = (
     "left_eye",
 )
 """What moves as one above the nose. A detector's points say less of it than of the mouth."""
+
+
+class HasMembers(Protocol):
+    """Subregions of a picture or of a mesh: all that is asked of them here."""
+
+    @property
+    def names(self) -> Sequence[str]: ...
+
+    @property
+    def members(self) -> Sequence[Int[Array, " k"]]: ...
 
 
 def coefficients(
@@ -50,14 +61,53 @@ def coefficients(
         one with another. EstimationError: all points in one place.
     Source: Z06 section 6, eq. (2) to (5).
     """
+    return coefficients_of(
+        _apart(example_set, points),
+        example_set.subregions,
+        distance_penalty=distance_penalty,
+        slack=slack,
+        together=together,
+    )
+
+
+def coefficients_of(
+    apart: Float[Array, "m n d"],
+    subregions: HasMembers,
+    *,
+    distance_penalty: float = 0.02,
+    slack: float = 0.0,
+    together: Sequence[Collection[str]] = (),
+) -> Float[Array, "R m"]:
+    """The same of any geometries, in the plane or in space.
+
+    Args:
+        apart: (m, n, d) the examples' geometries relative to the one asked for.
+        subregions: whose members are some of the n points.
+        distance_penalty, slack, together: as for `coefficients`.
+    Raises: InputError: as `coefficients`.
+    Source: Z06 section 6, eq. (2) to (5), section 9.
+    """
     if not 0 <= distance_penalty < np.inf:
         raise InputError("distance_penalty", "a number of at least 0", distance_penalty)
-    apart = _apart(example_set, points)
-    shares = np.empty((len(example_set.subregions.names), len(apart)))
-    for rows in _groups(example_set.subregions.names, together):
-        members = np.unique(np.concatenate([example_set.subregions.members[row] for row in rows]))
+    shares = np.empty((len(subregions.names), len(apart)))
+    for rows in _groups(subregions.names, together):
+        members = np.unique(np.concatenate([subregions.members[row] for row in rows]))
         shares[rows] = _shares(_columns(apart, members), distance_penalty, slack)
     return shares
+
+
+def distances_of(
+    apart: Float[Array, "m n d"], shares: Float[Array, "R m"], subregions: HasMembers
+) -> Float[Array, " R"]:
+    """How far the mixes of examples are from the geometry asked for.
+
+    Args:
+        apart: as for `coefficients_of`. shares: of the examples in each subregion.
+    Returns: (R,) root of the mean squared distance of each subregion's points.
+    """
+    parts = zip(shares, subregions.members, strict=True)
+    missed = [np.tensordot(row, apart[:, members], axes=1) for row, members in parts]
+    return np.array([np.sqrt((rest**2).sum(axis=1).mean()) for rest in missed])
 
 
 def _shares(
@@ -96,10 +146,7 @@ def hull_distances(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Floa
     """
     shares = coefficients(example_set, points, distance_penalty=0.0)
     apart = _apart(example_set, points)
-    parts = zip(example_set.subregions.members, shares, strict=True)
-    return np.array(
-        [np.sqrt(2 * np.mean((_columns(apart, members) @ row) ** 2)) for members, row in parts]
-    )
+    return distances_of(apart, shares, example_set.subregions)
 
 
 def _apart(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Float[Array, "m n 2"]:
@@ -109,7 +156,7 @@ def _apart(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Float[Array,
     return apart
 
 
-def _columns(apart: Float[Array, "m n 2"], members: Int[Array, " k"]) -> Float[Array, "d m"]:
+def _columns(apart: Float[Array, "m n d"], members: Int[Array, " k"]) -> Float[Array, "d m"]:
     """Of some points, one column an example."""
     columns: Array = apart[:, members].reshape(len(apart), -1).T
     return columns

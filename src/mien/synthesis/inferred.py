@@ -13,7 +13,7 @@ from mien.errors import InputError
 __all__ = ["LEAST_NOISE", "Inference", "Inferred", "check_known", "check_statistics"]
 
 LEAST_NOISE = 0.1
-"""Px: statistics that components explain wholly do not put given points beyond doubt."""
+"""Px or mm: statistics that components explain wholly do not put given points beyond doubt."""
 
 
 @dataclass(frozen=True)
@@ -21,13 +21,14 @@ class Inferred:
     """The displacements of all points.
 
     Attributes:
-        displacements: (n, 2) px from the neutral face. The known points, too, are where the
-            statistics put them; who wants them where they were given puts them back.
-        errors: (I,) px after each iteration, the mean distance at the known points from what was
+        displacements: (n, d) from the neutral face, px in a picture, mm in space. The known
+            points, too, are where the statistics put them; who wants them where they were given
+            puts them back.
+        errors: (I,) after each iteration, the mean distance at the known points from what was
             given for them.
     """
 
-    displacements: Float[Array, "n 2"]
+    displacements: Float[Array, "n d"]
     errors: Float[Array, " i"]
 
     @property
@@ -39,23 +40,23 @@ class Inferred:
 class Inference(Protocol):
     """A way to the displacements of all points from those of some."""
 
-    def infer(self, known: Int[Array, " k"], displacements: Float[Array, "k 2"]) -> Inferred: ...
+    def infer(self, known: Int[Array, " k"], displacements: Float[Array, "k d"]) -> Inferred: ...
 
 
-def check_statistics(value: object) -> Float[Array, "m n 2"]:
+def check_statistics(value: object) -> Float[Array, "m n d"]:
     """Displacements of all points in two expressions or more. Raises: InputError."""
-    statistics = check_array("statistics", value, (None, None, 2))
+    statistics = check_array("statistics", value, (None, None, None))
     if len(statistics) < 2:
         raise InputError("statistics", "2 expressions or more", len(statistics))
-    if statistics.shape[1] == 0:
+    if statistics.shape[1] == 0 or statistics.shape[2] == 0:
         raise InputError("statistics", "at least one point", "none")
     return statistics
 
 
 def check_known(
-    known: object, displacements: object, count: int
-) -> tuple[Int[Array, " k"], Float[Array, "k 2"]]:
-    """Indices of some of `count` points, in rising order, and their displacements.
+    known: object, displacements: object, count: int, axes: int = 2
+) -> tuple[Int[Array, " k"], Float[Array, "k d"]]:
+    """Indices of some of `count` points, in rising order, and their displacements along `axes`.
 
     Raises: InputError: none, one that is not there, one twice, shapes, NaN.
     """
@@ -68,7 +69,7 @@ def check_known(
     if outside.size:
         raise InputError("known", f"points from 0 to {count - 1}", outside[0])
     order = np.argsort(indices)
-    given = check_array("displacements", displacements, (len(indices), 2))
+    given = check_array("displacements", displacements, (len(indices), axes))
     twice = indices[order][1:][np.diff(indices[order]) == 0]
     if twice.size:
         raise InputError("known", "each point once", f"point {twice[0]} twice")

@@ -38,8 +38,8 @@ class Propagation:
 
     Args:
         layout: its point sets, by hierarchy.
-        statistics: (N, n, 2) px, displacements from the neutral face of expressions of the same
-            person, head motion compensated; N >= 2.
+        statistics: (N, n, d) displacements from the neutral face of expressions of the same
+            person, head motion compensated, px in a picture and mm in space; N >= 2.
         components: how many principal components the sets keep: one number, or one for each
             hierarchy.
         trust: what the known points of a set weigh together when it is projected, where all its
@@ -48,8 +48,8 @@ class Propagation:
         prior: the weight of how usual a displacement is, with what the components leave as the
             noise; 0 is as printed, 1 the most likely displacement for normally distributed ones.
             With it, more components do good where they overfit without.
-        threshold: px; the propagation stops when an iteration changes what it makes of the known
-            points by less than this, on the average of two.
+        threshold: px or mm; the propagation stops when an iteration changes what it makes of the
+            known points by less than this, on the average of two.
         max_iterations: it stops after so many in any case.
     Raises: InputError: shapes, NaN, too few statistics, sets of other points, options out of
         their range.
@@ -61,7 +61,7 @@ class Propagation:
     def __init__(
         self,
         layout: HasPointSets,
-        statistics: Float[Array, "m n 2"],
+        statistics: Float[Array, "m n d"],
         *,
         components: int | Sequence[int] = COMPONENTS,
         trust: float = 0.0,
@@ -70,8 +70,8 @@ class Propagation:
         max_iterations: int = 50,
     ) -> None:
         statistics = check_statistics(statistics)
-        self._count = statistics.shape[1]
-        self._sets = _check_sets(layout.sets, self._count)
+        self._shape = statistics.shape[1:]
+        self._sets = _check_sets(layout.sets, len(statistics[0]))
         self._trust = _check_not_negative("trust", trust)
         self._prior = _check_not_negative("prior", prior)
         self._threshold = check_positive("threshold", threshold)
@@ -80,20 +80,20 @@ class Propagation:
         self._max_iterations = max_iterations
         self._statistics = _fitted(statistics, self._sets, components)
 
-    def infer(self, known: Int[Array, " k"], displacements: Float[Array, "k 2"]) -> Inferred:
+    def infer(self, known: Int[Array, " k"], displacements: Float[Array, "k d"]) -> Inferred:
         """The displacements of all points from those of some, in any order.
 
         Points that no set contains or that no chain of sets joins to the known ones do not move.
 
         Args:
             known: indices of points, none twice.
-            displacements: (k, 2) px from the neutral face, head motion compensated.
+            displacements: (k, d) from the neutral face, head motion compensated.
         Raises: InputError: no points, unknown or repeated ones, NaN, none in any set.
         Source: Z06 sec. 10.1, `MotionPropagation`.
         """
-        known, given = check_known(known, displacements, self._count)
+        known, given = check_known(known, displacements, *self._shape)
         projections = self._projections(known)
-        moved = np.zeros((self._count, 2))
+        moved = np.zeros(self._shape)
         errors: list[float] = []
         progress: list[float] = []
         while not self._stops(progress):
@@ -107,7 +107,7 @@ class Propagation:
 
     def _projections(self, known: Int[Array, " k"]) -> list[_Projection]:
         """One for each set that is reached, in the order in which they are done."""
-        given = np.isin(np.arange(self._count), known)
+        given = np.isin(np.arange(self._shape[0]), known)
         return [
             self._projection(self._sets[level][index], self._statistics[level][index], given)
             for level, index in visiting_order(self._sets, known)
@@ -119,7 +119,7 @@ class Propagation:
         """Least squares over the set, known points weighted, coefficients held by the prior."""
         known = np.count_nonzero(given[points])
         weight = max(1.0, self._trust * len(points) / known) if known else 1.0
-        weighted = pca.components * np.repeat(np.where(given[points], weight, 1.0), 2)
+        weighted = pca.components * np.repeat(np.where(given[points], weight, 1.0), self._shape[1])
         # Relative to the noise of known points, so that trust leaves their balance with the prior.
         noise = weight * max(pca.residual, LEAST_NOISE) ** 2
         held = np.diag(self._prior * noise / pca.deviations**2)
@@ -142,10 +142,11 @@ class _Projection:
     gain: Float[Array, "c d"]
     components: Float[Array, "c d"]
 
-    def update(self, moved: Float[Array, "n 2"]) -> None:
+    def update(self, moved: Float[Array, "n d"]) -> None:
         """Replaces the displacements of the set's points, in place."""
         weights = self.gain @ (moved[self.points].ravel() - self.mean)
-        moved[self.points] = (self.mean + weights @ self.components).reshape(-1, 2)
+        usual = self.mean + weights @ self.components
+        moved[self.points] = usual.reshape(len(self.points), -1)
 
 
 def visiting_order(sets: PointSets, known: Int[Array, " k"]) -> list[tuple[int, int]]:
