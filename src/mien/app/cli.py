@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from mien.app.cli_examples import examples
 from mien.app.cli_track import track
 from mien.app.options import (
     check_finite,
@@ -255,6 +256,7 @@ def animate(
 
 
 app.command()(track)
+app.command()(examples)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
-import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -30,6 +28,7 @@ from mien.formats.head_json import (
     views_from_json,
 )
 from mien.formats.image import encode_image, load_image
+from mien.formats.npz import read_arrays
 from mien.formats.region_masks import read_masks, write_masks
 from mien.mesh import Mesh
 from mien.model.head import NEUTRAL, Expression, Head
@@ -111,7 +110,7 @@ def load_head(folder: str | Path) -> Head:
 
 
 def _head_from(folder: Path, data: Json) -> Head:
-    arrays = _read_arrays(folder / "geometry.npz")
+    arrays = read_arrays(folder / "geometry.npz")
     expressions = get(data, "expressions", dict)
     shapes = {
         name: Expression(
@@ -162,28 +161,6 @@ def _geometry(head: Head) -> dict[str, Any]:
         "uncertainty_mm": head.uncertainty_mm.astype(np.float32),
         "unit_offsets": head.units.astype(np.float32),
     }
-
-
-class _Arrays(dict[str, Array]):
-    """Arrays by name that says which file lacks one."""
-
-    def __init__(self, path: Path, arrays: Mapping[str, Array]) -> None:
-        super().__init__(arrays)
-        self.path = path
-
-    def __missing__(self, key: str) -> Array:
-        raise FileFormatError(self.path, "missing", key)
-
-
-def _read_arrays(path: Path) -> _Arrays:
-    try:
-        # Opened here: numpy leaves the file open when it is no archive.
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            return _Arrays(path, {name: file[name] for name in file.files})
-    except FileNotFoundError:
-        raise FileFormatError(path, "there is no such file") from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise FileFormatError(path, f"not a readable .npz file ({error})") from None
 
 
 def _write_photo(folder: Path, name: str, pixels: UInt8[Array, "h w 3"]) -> str:

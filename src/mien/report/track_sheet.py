@@ -12,13 +12,13 @@ from mien.model.head import Head
 from mien.render.picture import GREY, HeadRenderer
 from mien.render.shade import over_background
 from mien.report.likeness import draw_tracked
+from mien.report.sheet import arranged
 from mien.report.track_caption import say_lost, write_on
 from mien.report.track_window import window_of
 from mien.track.state import Track, TrackedFrame
 
 _CELL = (232, 320)
 """Width and height that a frame's picture may have, px."""
-_GAP = 4
 _WHITE = (255, 255, 255)
 
 
@@ -55,18 +55,4 @@ def contact_sheet(
             below = over_background(drawn.picture, GREY)[..., :3]
         above = write_on(frame, str(found.frame), _WHITE, at=(0.12, 0.06), size=15, outline=2)
         cells.append(np.concatenate([above, below]))
-    return _arranged(cells, columns)
-
-
-def _arranged(cells: list[UInt8[Array, "h w 3"]], columns: int) -> UInt8[Array, "h w 3"]:
-    """Cells of one size on a white sheet."""
-    height, width, _ = cells[0].shape
-    columns = min(columns, len(cells))
-    rows = -(-len(cells) // columns)
-    size = (rows * (height + _GAP) - _GAP, columns * (width + _GAP) - _GAP, 3)
-    sheet = np.full(size, 255, np.uint8)
-    for index, cell in enumerate(cells):
-        row, column = divmod(index, columns)
-        top, left = row * (height + _GAP), column * (width + _GAP)
-        sheet[top : top + height, left : left + width] = cell
-    return sheet
+    return arranged(cells, columns)

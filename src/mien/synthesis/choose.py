@@ -7,10 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mien.arrays import Array, Float, Int, check_array
+from mien.arrays import Array, Bool, Float, Int, check_array
 from mien.errors import InputError
 
-__all__ = ["ExampleCandidates", "ExampleChoice", "choose_examples"]
+__all__ = ["DETECTOR_NOISE", "ExampleCandidates", "ExampleChoice", "choose_examples"]
+
+DETECTOR_NOISE = 0.001
+"""How far a subregion's points jump between frames of a face that rests, in widths of the face:
+0.0003 to 0.0014 on four clips (root mean square, second differences, the calmest tenth)."""
+
+MAX_TURN = float(np.radians(25))
+"""Yaw or pitch away from neutral from which parts of the face are hidden."""
 
 _LEAST_SHARPNESS = 0.5
 """A frame with less than this share of the median sharpness is blurred."""
@@ -24,18 +31,44 @@ class ExampleCandidates:
         geometries: (N, n, 2) feature points with head motion taken out, px of the neutral photo.
         sharpness: (N,) any measure that grows with it.
         pose: (N, 2) yaw and pitch, radians.
+        names: of the pictures, for reasons; "candidate 12" where there are none.
+        unfit: why a picture cannot be an example, known beforehand; empty where it can.
     Raises: InputError: shapes, NaN.
     """
 
     geometries: Float[Array, "N n 2"]
     sharpness: Float[Array, " N"]
     pose: Float[Array, "N 2"]
+    names: tuple[str, ...] = ()
+    unfit: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that all describe the same photos."""
         count = len(check_array("geometries", self.geometries, (None, None, 2)))
         check_array("sharpness", self.sharpness, (count,))
         check_array("pose", self.pose, (count, 2))
+        for name in ("names", "unfit"):
+            texts = getattr(self, name)
+            if texts and len(texts) != count:
+                raise InputError(name, f"one for each of {count} candidates", len(texts))
+
+    def left_out(self, neutral: int, max_turn: float = MAX_TURN) -> list[str]:
+        """Why each cannot be an example; empty where it can."""
+        turned = np.abs(self.pose - self.pose[neutral]).max(axis=1)
+        share = self.sharpness / np.median(self.sharpness)
+        known = self.unfit or ("",) * len(self.geometries)
+        return [
+            f"turned away by {np.degrees(turn):.0f} degrees"
+            if turn > max_turn
+            else f"blurred, {sharp:.0%} of the usual sharpness"
+            if sharp < _LEAST_SHARPNESS
+            else reason
+            for turn, sharp, reason in zip(turned, share, known, strict=True)
+        ]
+
+    def name(self, row: int) -> str:
+        """What reasons call a candidate."""
+        return self.names[row] if self.names else f"candidate {row}"
 
 
 @dataclass(frozen=True)
@@ -43,12 +76,16 @@ class ExampleChoice:
     """The photos chosen, and why.
 
     Attributes:
-        rows: (m,) of the candidates, neutral first, then the most different first.
+        rows: (m,) of the candidates: neutral, those that were asked for, then the most different
+            first.
         reasons: one of each candidate, chosen or not.
+        sound: (N,) whether a candidate might have been chosen: neither blurred nor turned away nor
+            unfit nor excluded.
     """
 
     rows: Int[Array, " m"]
     reasons: tuple[str, ...]
+    sound: Bool[Array, " N"]
 
 
 def choose_examples(
@@ -57,7 +94,10 @@ def choose_examples(
     neutral: int,
     *,
     count: int = 40,
-    max_turn: float = np.radians(25),
+    least: float = 0.0,
+    max_turn: float = MAX_TURN,
+    wanted: dict[int, str] | None = None,
+    exclude: Sequence[int] = (),
 ) -> ExampleChoice:
     """Neutral, and again and again the photo least like any chosen so far.
 
@@ -67,69 +107,96 @@ def choose_examples(
     Args:
         regions: name of each subregion and the indices of its points.
         neutral: the row of the face at rest, chosen whatever its picture is like.
-        count: of examples at most; fewer when all others are left out or equal a chosen one. The
-            paper has 10 to 15; on two clips 15 gave 3.2 and 3.5 dB over the warp of neutral,
+        count: of examples at most; fewer when all others are left out or are like a chosen one.
+            The paper has 10 to 15; on two clips 15 gave 3.2 and 3.5 dB over the warp of neutral,
             40 gave 5.2 and 4.0, 80 gave 5.8 and 4.9.
-        max_turn: yaw or pitch away from neutral, radians, from which parts of the face are hidden.
-    Raises: InputError: no such neutral, count not positive, a region without points.
+        least: px, root mean square over the points of a subregion; a photo that differs from a
+            chosen one by less in every subregion is like it.
+        max_turn: yaw or pitch away from neutral, radians, that an example may have at most.
+        wanted: rows that are chosen whatever they are like, with the reason.
+        exclude: rows that are not.
+    Raises: InputError: no such row, count not positive, a region without points.
     Source: Z06 section 14, "sufficiently different from each other while covering all".
     """
     total = len(candidates.geometries)
-    if not 0 <= neutral < total:
-        raise InputError("neutral", f"one of {total} candidates, from 0", neutral)
+    wanted = {neutral: "neutral"} | {k: v for k, v in (wanted or {}).items() if k != neutral}
+    _check_rows(total, neutral, wanted, exclude)
     if count < 1:
         raise InputError("count", "a number above zero", count)
-    reasons = _left_out(candidates, neutral, max_turn)
-    reasons[neutral] = "neutral"
-    usable = np.array([not reason for reason in reasons])
-    return _farthest(_Distances(candidates.geometries, regions), usable, reasons, neutral, count)
+    reasons = candidates.left_out(neutral, max_turn)
+    for row in exclude:
+        reasons[row] = "excluded"
+    sound = np.array([not reason for reason in reasons])
+    for row, reason in wanted.items():
+        reasons[row] = reason
+    usable = sound.copy()
+    usable[list(wanted)] = False
+    distances = _Distances(candidates.geometries, regions, least)
+    rows = _farthest(distances, usable, candidates, reasons, list(wanted), count)
+    return ExampleChoice(np.array(rows), tuple(reasons), sound)
+
+
+def _check_rows(total: int, neutral: int, wanted: dict[int, str], exclude: Sequence[int]) -> None:
+    for name, rows in (("neutral", [neutral]), ("wanted", [*wanted]), ("exclude", exclude)):
+        for row in rows:
+            if not 0 <= row < total:
+                raise InputError(name, f"one of {total} candidates, from 0", row)
+    for row in exclude:
+        if row in wanted:
+            raise InputError("exclude", "others than those that are wanted", wanted[row])
 
 
 def _farthest(
-    distances: _Distances, usable: Array, reasons: list[str], neutral: int, count: int
-) -> ExampleChoice:
+    distances: _Distances,
+    usable: Bool[Array, " N"],
+    candidates: ExampleCandidates,
+    reasons: list[str],
+    chosen: list[int],
+    count: int,
+) -> list[int]:
     """Whichever usable one is farthest from all chosen so far, until there are enough."""
-    chosen = [neutral]
-    nearest, owner = distances.to(neutral), np.full(len(usable), neutral)
-    usable = usable.copy()
-    while len(chosen) < count and usable.any():
-        row = int(np.where(usable, nearest, -1.0).argmax())
-        if nearest[row] <= 0:
-            break
-        name = distances.largest(row, int(owner[row]))
-        reasons[row] = f"chosen as number {len(chosen) + 1}, for the {name}"
-        chosen.append(row)
-        usable[row] = False
+    nearest, owner = distances.to(chosen[0]), np.full(len(usable), chosen[0])
+
+    def take(row: int) -> None:
+        nonlocal nearest, owner
         apart = distances.to(row)
         owner = np.where(apart < nearest, row, owner)
         nearest = np.minimum(apart, nearest)
+
+    for row in chosen[1:]:
+        take(row)
+    while len(chosen) < count and usable.any():
+        row = int(np.where(usable, nearest, -1.0).argmax())
+        other = int(owner[row])
+        usable[row] = False
+        if not distances.differ(row, other):
+            reasons[row] = f"like {candidates.name(other)}"
+            continue
+        chosen.append(row)
+        reasons[row] = f"chosen as number {len(chosen)}, for the {distances.largest(row, other)}"
+        take(row)
     for left in np.flatnonzero(usable).tolist():
-        reasons[left] = f"like candidate {owner[left]}"
-    return ExampleChoice(np.array(chosen), tuple(reasons))
-
-
-def _left_out(candidates: ExampleCandidates, neutral: int, max_turn: float) -> list[str]:
-    """Why each cannot be an example; empty where it can."""
-    turned = np.abs(candidates.pose - candidates.pose[neutral]).max(axis=1)
-    share = candidates.sharpness / np.median(candidates.sharpness)
-    return [
-        f"turned away by {np.degrees(turn):.0f} degrees"
-        if turn > max_turn
-        else f"blurred, {sharp:.0%} of the usual sharpness"
-        if sharp < _LEAST_SHARPNESS
-        else ""
-        for turn, sharp in zip(turned, share, strict=True)
-    ]
+        reasons[left] = f"like {candidates.name(int(owner[left]))}"
+    return chosen
 
 
 class _Distances:
-    """How unlike candidates are, summed over subregions."""
+    """How unlike candidates are, summed over subregions.
+
+    Args:
+        least: px by which two must differ to be different at all.
+    """
 
     def __init__(
-        self, geometries: Float[Array, "N n 2"], regions: Sequence[tuple[str, Int[Array, " k"]]]
+        self,
+        geometries: Float[Array, "N n 2"],
+        regions: Sequence[tuple[str, Int[Array, " k"]]],
+        least: float,
     ) -> None:
         self._names = [name for name, _ in regions]
-        self._parts = [_unit_spread(name, geometries, members) for name, members in regions]
+        parts = [_unit_spread(name, geometries, members, least) for name, members in regions]
+        self._parts = [part for part, _ in parts]
+        self._least = [least / spread for _, spread in parts]
 
     def to(self, row: int) -> Float[Array, " N"]:
         """From every candidate to one."""
@@ -138,19 +205,28 @@ class _Distances:
 
     def largest(self, row: int, other: int) -> str:
         """The subregion in which both differ most."""
-        return self._names[int(self._by_region(other)[:, row].argmax())]
+        return self._names[int(self._between(row, other).argmax())]
+
+    def differ(self, row: int, other: int) -> bool:
+        """Whether they do in any subregion by more than they must."""
+        apart = np.sqrt(self._between(row, other))
+        return bool((apart > np.maximum(self._least, 1e-9)).any())
+
+    def _between(self, row: int, other: int) -> Float[Array, " R"]:
+        return np.array([((part[row] - part[other]) ** 2).sum() for part in self._parts])
 
     def _by_region(self, row: int) -> Float[Array, "R N"]:
         return np.stack([((part - part[row]) ** 2).sum(axis=1) for part in self._parts])
 
 
 def _unit_spread(
-    name: str, geometries: Float[Array, "N n 2"], members: Int[Array, " k"]
-) -> Float[Array, "N d"]:
+    name: str, geometries: Float[Array, "N n 2"], members: Int[Array, " k"], least: float
+) -> tuple[Float[Array, "N d"], float]:
+    """A subregion's points over their spread, and that spread, px; at least the least one."""
     if not len(members):
         raise InputError(f"subregion {name}", "at least one point", "none")
     part = geometries[:, members].reshape(len(geometries), -1)
-    part = part - part.mean(axis=0)
-    spread = float(np.sqrt((part**2).sum(axis=1).mean()))
+    part = (part - part.mean(axis=0)) / np.sqrt(len(members))
+    spread = max(float(np.sqrt((part**2).sum(axis=1).mean())), least)
     scaled: Array = part / spread if spread > 0 else part
-    return scaled
+    return scaled, spread or 1.0

@@ -1,0 +1,193 @@
+"""`mien examples`: photos or a video of one person to what expressions are mixed from."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mien.app.example_marks import points_of, read_marks
+from mien.assets.feature_points import FeatureLayout, load_feature_layout
+from mien.capture.detector import LandmarkDetector
+from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of
+from mien.capture.photos import load_photo
+from mien.formats.atomic import atomic_folder
+from mien.formats.example_folder import (
+    check_example_place,
+    is_example_folder,
+    write_example_files,
+)
+from mien.formats.image import encode_image
+from mien.report.example_sheet import example_sheet
+from mien.synthesis.examples import ExampleSet
+from mien.synthesis.gather import COUNT, ExamplePlan, Wishes, build_examples, plan_examples
+
+if TYPE_CHECKING:
+    from mien.build import Progress
+
+FINDING, FETCHING, WRITING = "Finding the face", "Fetching the examples", "Writing"
+COUNTED = (FINDING,)
+"""Stages whose steps are pictures."""
+MAX_SIDE = 1200
+"""px; larger photos are reduced to it: a face needs no more than some 600 px for its wrinkles."""
+
+
+@dataclass(frozen=True)
+class ExampleRequest:
+    """What the user says of the choice; pictures by frame number or file name.
+
+    Attributes:
+        count: of examples at most.
+        neutral, standard: which picture is that; None: found.
+        include, exclude: pictures that are, and are not, to be examples.
+        face: which one, from left to right, in photos of several people.
+        max_side: px; larger pictures are reduced to it.
+    """
+
+    count: int = COUNT
+    neutral: str | None = None
+    standard: str | None = None
+    include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    face: int | None = None
+    max_side: int = MAX_SIDE
+
+    def wishes(self, series: FaceSeries) -> Wishes:
+        """The same by the rows of a series. Raises: InputError: names what is not there."""
+        return Wishes(
+            None if self.neutral is None else row_of(series, self.neutral, "--neutral"),
+            None if self.standard is None else row_of(series, self.standard, "--standard"),
+            tuple(row_of(series, name, "--include") for name in self.include),
+            tuple(row_of(series, name, "--exclude") for name in self.exclude),
+        )
+
+
+@dataclass(frozen=True)
+class GatheredExamples:
+    """What came of a source.
+
+    Attributes:
+        examples: in the order in which they were chosen, neutral first.
+        why: each was chosen, by name.
+        pictures: name and reason, or "", of all that there were.
+        notes: what the user should know.
+    """
+
+    examples: ExampleSet
+    why: dict[str, str]
+    pictures: tuple[tuple[str, str], ...]
+    notes: tuple[str, ...]
+
+
+def write_example_folder(
+    source: str | Path,
+    folder: str | Path,
+    *,
+    request: ExampleRequest | None = None,
+    progress: Progress | None = None,
+) -> GatheredExamples:
+    """Examples of a person, in a folder, whole or not at all.
+
+    Raises: InputError, FileFormatError, EstimationError: before anything is written; as
+        `gather_examples`, and a place that holds something else.
+    """
+    tell = progress or (lambda stage, done, total: None)
+    check_example_place(folder)
+    gathered = gather_examples(source, request=request, progress=tell)
+    tell(WRITING, 0, 0)
+    with atomic_folder(folder, replaces=is_example_folder) as temporary:
+        write_example_files(temporary, gathered.examples, why=gathered.why)
+        sheet = example_sheet(gathered.examples, gathered.why)
+        (temporary / "examples.jpg").write_bytes(encode_image(sheet, "JPEG", quality=92))
+        (temporary / "choice.csv").write_text(_choice_csv(gathered.pictures), encoding="utf-8")
+    tell(WRITING, 1, 1)
+    return gathered
+
+
+def gather_examples(
+    source: str | Path,
+    *,
+    request: ExampleRequest | None = None,
+    layout: FeatureLayout | None = None,
+    progress: Progress | None = None,
+) -> GatheredExamples:
+    """Examples of the person in a video or in a folder of photos.
+
+    Args:
+        layout: of the points; mien's own unless given.
+        progress: told the stage, steps done and their total.
+    Raises: InputError: no such source, a picture asked for that is not there. FileFormatError: a
+        damaged photo, video or file of marks. EstimationError: no picture shows a face.
+    """
+    request, layout = request or ExampleRequest(), layout or load_feature_layout()
+    tell = progress or (lambda stage, done, total: None)
+    with LandmarkDetector() as detector:
+        series = find_faces(
+            source,
+            detector,
+            max_side=request.max_side,
+            face=request.face,
+            report=partial(tell, FINDING),
+        )
+    wishes = request.wishes(series)
+    marks = _marks(series, layout)
+    points = points_of(series, layout, marks)
+    plan = plan_examples(layout, series, points, wishes=wishes, count=request.count)
+    rows = plan.choice.rows.tolist()
+    photos = dict(load_pictures(series, rows, partial(tell, FETCHING)))
+    video = series.source.name if series.is_video else ""
+    examples, why = build_examples(plan, photos, source=video)
+    pictures = dict(zip(plan.names, plan.choice.reasons, strict=True)) | series.left_out
+    notes = (*series.notes, *_notes(plan, series, marks))
+    return GatheredExamples(examples, why, tuple(sorted(pictures.items())), notes)
+
+
+def _marks(series: FaceSeries, layout: FeatureLayout) -> dict[int, dict]:
+    found = {}
+    for row, file in enumerate(series.files):
+        photo = load_photo(file, max_side=series.max_side)
+        if marks := read_marks(file, photo, layout):
+            found[row] = marks
+    return found
+
+
+def _notes(plan: ExamplePlan, series: FaceSeries, marks: dict[int, dict]) -> list[str]:
+    """How many pictures were what, and what is missing."""
+    notes = [
+        f"{series.names[row]}: {len(found)} points marked by hand" for row, found in marks.items()
+    ]
+    counts = Counter(_kind(reason) for reason in plan.choice.reasons)
+    counts["without a usable face"] = len(series.left_out)
+    told = [f"{counts[kind]} {kind}" for kind in KINDS if counts[kind]]
+    notes.append(f"of {len(series) + len(series.left_out)} pictures {', '.join(told)}")
+    return notes
+
+
+KINDS = (
+    "chosen",
+    "like chosen ones",
+    "blurred",
+    "turned away",
+    "excluded",
+    "without a usable face",
+)
+
+
+def _kind(reason: str) -> str:
+    for start, kind in (("like ", KINDS[1]), ("blurred", KINDS[2]), ("turned away", KINDS[3])):
+        if reason.startswith(start):
+            return kind
+    return "excluded" if reason == "excluded" else "chosen"
+
+
+def _choice_csv(pictures: Sequence[tuple[str, str]]) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["picture", "reason"])
+    writer.writerows(pictures)
+    return stream.getvalue()

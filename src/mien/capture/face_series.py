@@ -1,0 +1,239 @@
+"""Every picture of one person's face: all photos of a folder, or all frames of a video."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mien.arrays import Array, Float, UInt8
+from mien.capture.detector import LandmarkDetector, look_twice
+from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
+from mien.capture.frame_choice import FrameScores
+from mien.capture.frame_photos import fetch_frames, frame_name
+from mien.capture.frames_ahead import frames_ahead
+from mien.capture.landmarks import Landmarks
+from mien.capture.mediapipe_face import DetectedFace
+from mien.capture.photos import Photo, load_photo
+from mien.capture.sharpness import face_sharpness
+from mien.capture.video import VIDEO_SUFFIXES, Video
+from mien.errors import EstimationError, InputError
+
+__all__ = ["FaceSeries", "Look", "find_faces", "load_pictures"]
+
+Look = Callable[[UInt8[Array, "h w 3"], Float[Array, "478 2"]], None]
+"""Told of each picture that shows a face, in the series' order, and where its landmarks are."""
+
+Report = Callable[[int, int], None]
+"""Told the number of steps done and their total; 0: not known."""
+
+
+@dataclass(frozen=True)
+class FaceSeries:
+    """The pictures that show the person's face, without their pixels.
+
+    Attributes:
+        source: the video or the folder. is_video: which of both.
+        files: of a folder, each picture's file; of a video, empty.
+        names: of the pictures: `frame_000123.png`, `smile.jpg`, or `joy/smile.jpg` in a folder of
+            one folder an expression.
+        landmarks: (N, 478, 2) px of the picture as `load_pictures` gives it.
+        scores: of the same; `index` counts frames or photos from 0.
+        max_side: px; larger pictures are reduced to it.
+        left_out: why, by name, of the pictures in which no face can be used.
+        notes: what was odd.
+    """
+
+    source: Path
+    is_video: bool
+    files: tuple[Path, ...]
+    names: tuple[str, ...]
+    landmarks: Float[Array, "n 478 2"]
+    scores: FrameScores
+    max_side: int
+    left_out: dict[str, str]
+    notes: tuple[str, ...]
+
+    def __len__(self) -> int:
+        """How many pictures show the face."""
+        return len(self.names)
+
+
+def find_faces(
+    source: str | Path,
+    detector: LandmarkDetector,
+    *,
+    max_side: int,
+    face: int | None = None,
+    look: Look | None = None,
+    report: Report | None = None,
+) -> FaceSeries:
+    """The face in every photo of a folder or in every frame of a video.
+
+    Args:
+        max_side: px; larger pictures are reduced to it.
+        face: as for LandmarkDetector.detect, of photos; a video's is its largest.
+        look: called with each picture that shows the face, as long as its pixels are there.
+    Raises: InputError, FileFormatError: no such source, damaged, not a video, no photo in it.
+        EstimationError: no picture shows a face.
+    """
+    source = Path(source)
+    gathered = _Gathered(source, max_side, look or (lambda pixels, landmarks: None))
+    if source.is_file() and source.suffix.lower() in VIDEO_SUFFIXES:
+        gathered.read_video(detector, report)
+    else:
+        gathered.read_photos(detector, face, report)
+    return gathered.series()
+
+
+def load_pictures(
+    series: FaceSeries, rows: Collection[int], report: Report | None = None
+) -> Iterator[tuple[int, Photo]]:
+    """The pictures of some rows of a series with the rows, in the series' order."""
+    if not series.is_video:
+        for number, row in enumerate(sorted(rows)):
+            yield row, load_photo(series.files[row], max_side=series.max_side)
+            if report is not None:
+                report(number + 1, len(rows))
+        return
+    row_of = {int(series.scores.index[row]): row for row in rows}
+    last = max(row_of, default=0)
+    for index, photo in fetch_frames(
+        Video(series.source),
+        row_of,
+        series.max_side,
+        lambda frame: None if report is None else report(frame + 1, last + 1),
+    ):
+        yield row_of[index], photo
+
+
+class _Gathered:
+    """What was found so far."""
+
+    def __init__(self, source: Path, max_side: int, look: Look) -> None:
+        self.source, self.max_side, self.look = source, max_side, look
+        self.is_video = False
+        self.files: list[Path] = []
+        self.names: list[str] = []
+        self.landmarks: list[Array] = []
+        self.rows: list[tuple[int, float, DetectedFace]] = []
+        self.left_out: dict[str, str] = {}
+        self.notes: list[str] = []
+
+    def read_video(self, detector: LandmarkDetector, report: Report | None) -> None:
+        """Every frame, looked at once."""
+        self.is_video = True
+        video = Video(self.source)
+        total = video.facts().frames
+        with frames_ahead(video, max_side=self.max_side) as pictures:
+            for picture in pictures:
+                found = look_twice(detector, picture.pixels)
+                if found is None:
+                    self.left_out[frame_name(picture.frame)] = "no face found"
+                else:
+                    self._add(frame_name(picture.frame), picture.frame, picture.pixels, found)
+                if report is not None:
+                    report(picture.frame + 1, max(total, picture.frame + 1))
+        self.notes += [f"{self.source.name}: {note}" for note in video.notes]
+
+    def read_photos(
+        self, detector: LandmarkDetector, face: int | None, report: Report | None
+    ) -> None:
+        """Every photo, looked at as closely as `LandmarkDetector.detect` does."""
+        folders = photo_files(self.source)
+        self.notes += ignored_files(self.source)
+        total = sum(map(len, folders.values()))
+        number = 0
+        for folder, paths in folders.items():
+            self.notes += orphaned_annotations(paths)
+            for path in paths:
+                name = path.name if len(folders) == 1 else f"{folder}/{path.name}"
+                self._add_photo(name, number, path, detector, face)
+                number += 1
+                if report is not None:
+                    report(number, total)
+
+    def _add_photo(
+        self, name: str, number: int, path: Path, detector: LandmarkDetector, face: int | None
+    ) -> None:
+        photo = load_photo(path, max_side=self.max_side)
+        self.notes += [f"{name}: {note}" for note in photo.notes]
+        try:
+            landmarks = detector.detect(photo, face=face)
+        except EstimationError as error:
+            self.left_out[name] = str(error).removeprefix(f"{photo.name}: ")
+            return
+        self.notes += [f"{name}: {note}" for note in landmarks.notes]
+        self.files.append(path)
+        self._add(name, number, photo.pixels, _as_detected(landmarks))
+
+    def _add(
+        self, name: str, number: int, pixels: UInt8[Array, "h w 3"], found: DetectedFace
+    ) -> None:
+        points = found.points[:, :2]
+        self.names.append(name)
+        self.landmarks.append(points)
+        self.rows.append((number, face_sharpness(pixels, points), found))
+        self.look(pixels, points)
+
+    def series(self) -> FaceSeries:
+        """All of it."""
+        if not self.rows:
+            what = "frames" if self.is_video else "photos"
+            reasons = [f"{name}: {reason}" for name, reason in self.left_out.items()]
+            shown = "" if self.is_video else f" ({'; '.join(reasons[:3])})"
+            raise EstimationError(f"{self.source}: no face found in any of its {what}{shown}")
+        return FaceSeries(
+            self.source,
+            self.is_video,
+            tuple(self.files),
+            tuple(self.names),
+            np.stack(self.landmarks),
+            FrameScores.of(*zip(*self.rows, strict=True)),
+            self.max_side,
+            self.left_out,
+            tuple(self.notes),
+        )
+
+
+def _as_detected(landmarks: Landmarks) -> DetectedFace:
+    """What a closer look at a photo found, as a look at a frame gives it."""
+    points = np.column_stack([landmarks.points, np.zeros(len(landmarks.points))])
+    return DetectedFace(points, landmarks.blendshapes, landmarks.R_cam_head)
+
+
+def row_of(series: FaceSeries, what: str, option: str) -> int:
+    """The row of a picture that a user names: a frame's number, a file's name, its stem.
+
+    Raises: InputError: there is none; a picture that shows no face.
+    """
+    rows = [row for row in range(len(series)) if _is_named(series, row, what)]
+    if len(rows) == 1:
+        return rows[0]
+    if rows:
+        raise InputError(option, "one picture", f"{what!r}, which names {len(rows)}")
+    for name, reason in series.left_out.items():
+        if what in _names_of(name):
+            raise InputError(option, "a picture that shows the face", f"{name}: {reason}")
+    raise InputError(option, _expected(series), what)
+
+
+def _is_named(series: FaceSeries, row: int, what: str) -> bool:
+    if series.is_video and what.isascii() and what.isdecimal():
+        return int(series.scores.index[row]) == int(what)
+    return what in _names_of(series.names[row])
+
+
+def _names_of(name: str) -> Sequence[str]:
+    path = Path(name)
+    return (name, str(path.with_suffix("")), path.name, path.stem)
+
+
+def _expected(series: FaceSeries) -> str:
+    if series.is_video:
+        last = int(series.scores.index[-1])
+        return f"the number of a frame, from 0 to {last}, or its name"
+    shown = ", ".join(series.names[:3]) + (", ..." if len(series) > 3 else "")
+    return f"the name of a photo ({shown})"

@@ -1,0 +1,310 @@
+"""The example folder: what `mien examples` leaves, readable without mien (docs/examples.md)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from mien.arrays import Array, Float, UInt8
+from mien.assets.feature_points import FeatureLayout, load_feature_layout
+from mien.assets.subregions import Subregions, default_subregions
+from mien.errors import FileFormatError, InputError
+from mien.formats.atomic import atomic_folder, check_folder_place
+from mien.formats.head_json import Broken, is_inside
+from mien.formats.image import encode_image, load_image
+from mien.formats.npz import read_arrays
+from mien.formats.strict_json import (
+    as_list,
+    as_number,
+    as_object,
+    as_text,
+    check_format,
+    join,
+    need,
+    read_json,
+    unknown,
+)
+from mien.synthesis.align import aligned_photos
+from mien.synthesis.examples import Example, ExampleSet
+
+__all__ = [
+    "check_example_place",
+    "is_example_folder",
+    "load_examples",
+    "read_reasons",
+    "write_example_files",
+    "write_examples",
+]
+
+FORMAT = "mien examples"
+VERSION = 1
+INDEX, STATISTICS, SUBREGIONS = "examples.json", "statistics.npz", "subregions.npz"
+
+
+def write_examples(
+    folder: str | Path, example_set: ExampleSet, *, why: Mapping[str, str] | None = None
+) -> None:
+    """Write an example folder in place of the one that is there, whole or not at all.
+
+    Args:
+        why: the reason for each example, by name.
+    Raises: InputError: the place holds something else or cannot be written; a name that is no
+        file's.
+    """
+    with atomic_folder(folder, replaces=is_example_folder) as temporary:
+        write_example_files(temporary, example_set, why=why)
+
+
+def write_example_files(
+    folder: Path, example_set: ExampleSet, *, why: Mapping[str, str] | None = None
+) -> None:
+    """As write_examples, but straight into an empty folder: for a caller that adds more to it."""
+    for example in example_set.examples:
+        if not is_inside(f"{example.name}.png") or "/" in example.name:
+            raise InputError("example", "a name that can be a file's", repr(example.name))
+    for part in ("photos", "textures"):
+        (folder / part).mkdir()
+    for example, texture in zip(example_set.examples, aligned_photos(example_set), strict=True):
+        _write_png(folder / _photo_file(example), example.photo)
+        _write_png(folder / "textures" / f"{example.name}.png", texture)
+    standard = example_set.examples[example_set.standard]
+    _write_png(folder / "standard.png", standard.photo)
+    _write_png(folder / "subregions.png", _drawn(example_set.subregions))
+    if not _are_usual(example_set):
+        np.savez_compressed(folder / SUBREGIONS, **_subregion_arrays(example_set.subregions))
+    np.savez_compressed(folder / STATISTICS, geometries=example_set.statistics)
+    text = json.dumps(_to_json(example_set, why or {}), indent=1, allow_nan=False)
+    (folder / INDEX).write_text(text + "\n", encoding="utf-8")
+
+
+def is_example_folder(folder: Path) -> bool:
+    """Whether mien made this folder, of whatever version."""
+    try:
+        return bool(read_json(Path(folder) / INDEX).get("format") == FORMAT)
+    except (FileFormatError, InputError):
+        return False
+
+
+def check_example_place(folder: str | Path) -> None:
+    """Refuse a place for examples before the work is done. Raises: InputError."""
+    check_folder_place(folder, replaces=is_example_folder)
+
+
+def load_examples(folder: str | Path, *, layout: FeatureLayout | None = None) -> ExampleSet:
+    """The examples in a folder, exactly as they were written.
+
+    Args:
+        layout: of the points; mien's own unless given.
+    Raises: InputError: no such folder. FileFormatError: something in it is missing, damaged, of
+        another layout or newer than this program; the message names the file and the place in it.
+    """
+    folder, layout = Path(folder), layout or load_feature_layout()
+    path, data = _read_index(folder)
+    try:
+        return _from_json(folder, data, layout)
+    except Broken as broken:
+        raise FileFormatError(path, broken.problem, broken.place) from None
+    except InputError as error:
+        raise FileFormatError(path, f"{error} (or the other files do not fit it)") from None
+
+
+def read_reasons(folder: str | Path) -> dict[str, str]:
+    """Why each example was chosen, by name. Raises: as load_examples."""
+    path, data = _read_index(Path(folder))
+    try:
+        entries = as_list(need(data, "examples", ""), "examples")
+        return {
+            as_text(need(as_object(entry, place), "name", place), f"{place}.name"): as_text(
+                entry.get("why", ""), f"{place}.why"
+            )
+            for number, entry in enumerate(entries)
+            for place in (f"examples[{number}]",)
+        }
+    except Broken as broken:
+        raise FileFormatError(path, broken.problem, broken.place) from None
+
+
+def _read_index(folder: Path) -> tuple[Path, dict[str, Any]]:
+    path = folder / INDEX
+    if not folder.is_dir():
+        found = "a file" if folder.exists() else "nothing at that place"
+        raise InputError(folder, "an example folder that `mien examples` made", found)
+    if not path.exists():
+        raise FileFormatError(path, "there is no such file; is this an example folder?")
+    data = read_json(path)
+    try:
+        check_format(data, FORMAT, VERSION)
+    except Broken as broken:
+        raise FileFormatError(path, broken.problem, broken.place) from None
+    return path, data
+
+
+def _to_json(example_set: ExampleSet, why: Mapping[str, str]) -> dict[str, Any]:
+    names = [example.name for example in example_set.examples]
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "layout": {
+            "name": example_set.layout.name,
+            "points": list(example_set.layout.names),
+            "pixels": "origin at the top-left corner, centre of the first pixel at (0.5, 0.5)",
+        },
+        "neutral": names[0],
+        "standard": names[example_set.standard],
+        "teeth": [names[index] for index in example_set.teeth],
+        "statistics": {"file": STATISTICS, "pictures": len(example_set.statistics)},
+        "examples": [
+            {
+                "name": example.name,
+                "source": example.source,
+                "why": why.get(example.name, ""),
+                "photo": _photo_file(example),
+                "size": [example.photo.shape[1], example.photo.shape[0]],
+                "points": {
+                    name: [float(x), float(y)]
+                    for name, (x, y) in zip(example_set.layout.names, example.points, strict=True)
+                },
+            }
+            for example in example_set.examples
+        ],
+    }
+
+
+def _from_json(folder: Path, data: dict[str, Any], layout: FeatureLayout) -> ExampleSet:
+    _check_layout(as_object(need(data, "layout", ""), "layout"), layout)
+    entries = as_list(need(data, "examples", ""), "examples")
+    examples = tuple(
+        _example(folder, as_object(entry, f"examples[{i}]"), f"examples[{i}]", layout)
+        for i, entry in enumerate(entries)
+    )
+    if not examples:
+        raise Broken("examples", "expected at least one, the neutral face; found none")
+    names = [example.name for example in examples]
+    if need(data, "neutral", "") != names[0]:
+        problem = f"expected {names[0]!r}, the first example; found {str(data['neutral'])[:40]!r}"
+        raise Broken("neutral", problem)
+    teeth = as_list(need(data, "teeth", ""), "teeth")
+    standard = _index_of(need(data, "standard", ""), "standard", names)
+    return ExampleSet(
+        layout,
+        examples,
+        standard,
+        _statistics(folder / STATISTICS, layout),
+        _subregions(folder / SUBREGIONS, layout, examples[standard]),
+        tuple(_index_of(name, f"teeth[{i}]", names) for i, name in enumerate(teeth)),
+    )
+
+
+def _check_layout(data: dict[str, Any], layout: FeatureLayout) -> None:
+    """The points must be those of the layout, in its order: shares and statistics rely on it."""
+    name = as_text(need(data, "name", "layout"), "layout.name")
+    points = as_list(need(data, "points", "layout"), "layout.points")
+    if name == layout.name and points == list(layout.names):
+        return
+    expected = f"the {len(layout.names)} points of {layout.name}"
+    found = f"{len(points)} of {name[:40]}" + ", other ones" * (name == layout.name)
+    raise Broken("layout", f"expected {expected}, found {found}: run `mien examples` again")
+
+
+def _example(folder: Path, data: dict[str, Any], place: str, layout: FeatureLayout) -> Example:
+    file = as_text(need(data, "photo", place), f"{place}.photo")
+    if not is_inside(file):
+        raise Broken(f"{place}.photo", f"expected a file within the folder, found {file[:60]!r}")
+    photo = load_image(folder / PurePosixPath(file))
+    size = as_list(need(data, "size", place), f"{place}.size")
+    actual = [photo.shape[1], photo.shape[0]]
+    if size != actual:
+        raise FileFormatError(folder / file, f"expected {size} px, found {actual}")
+    return Example(
+        as_text(need(data, "name", place), f"{place}.name"),
+        photo,
+        _points(need(data, "points", place), f"{place}.points", layout),
+        as_text(need(data, "source", place), f"{place}.source"),
+    )
+
+
+def _points(value: object, place: str, layout: FeatureLayout) -> Float[Array, "n 2"]:
+    named = as_object(value, place, layout.names)
+    points = np.empty((len(layout.names), 2))
+    for index, name in enumerate(layout.names):
+        where = join(place, name)
+        pair = as_list(need(named, name, place), where)
+        if len(pair) != 2:
+            raise Broken(where, f"expected [x, y] in px, found {len(pair)} numbers")
+        points[index] = [as_number(number, where) for number in pair]
+    return points
+
+
+def _index_of(name: object, place: str, names: list[str]) -> int:
+    if as_text(name, place) not in names:
+        raise Broken(place, unknown("example", str(name), names))
+    return names.index(str(name))
+
+
+def _statistics(path: Path, layout: FeatureLayout) -> Float[Array, "N n 2"]:
+    geometries = read_arrays(path)["geometries"]
+    expected = (len(layout.names), 2)
+    if geometries.ndim != 3 or geometries.shape[1:] != expected or not len(geometries):
+        problem = f"expected shape (any, {expected[0]}, 2) of {layout.name}, found"
+        raise FileFormatError(path, f"{problem} {geometries.shape}", "geometries")
+    if geometries.dtype.kind != "f" or not np.isfinite(geometries).all():
+        raise FileFormatError(path, "expected finite numbers, found others", "geometries")
+    return geometries
+
+
+def _subregions(path: Path, layout: FeatureLayout, standard: Example) -> Subregions:
+    height, width = standard.photo.shape[:2]
+    usual = default_subregions(layout, standard.points, (width, height))
+    if not path.exists():
+        return usual
+    arrays = read_arrays(path)
+    names = tuple(str(name) for name in arrays["names"])
+    members = tuple(arrays[f"members/{name}"] for name in names)
+    fades = arrays["fades"]
+    if fades.shape != (height, width, len(names)):
+        problem = f"expected shape {(height, width, len(names))} of standard.png, found"
+        raise FileFormatError(path, f"{problem} {fades.shape}", "fades")
+    return replace(usual, names=names, fades=fades, members=members)
+
+
+def _subregion_arrays(subregions: Subregions) -> dict[str, Any]:
+    members = zip(subregions.names, subregions.members, strict=True)
+    return {f"members/{name}": rows for name, rows in members} | {
+        "names": np.array(subregions.names),
+        "fades": subregions.fades,
+    }
+
+
+def _are_usual(example_set: ExampleSet) -> bool:
+    """Whether the subregions are those that mien draws, so that none need to be kept."""
+    standard, ours = example_set.examples[example_set.standard], example_set.subregions
+    height, width = standard.photo.shape[:2]
+    usual = default_subregions(example_set.layout, standard.points, (width, height))
+    return (
+        usual.names == ours.names
+        and np.array_equal(usual.fades, ours.fades)
+        and all(map(np.array_equal, usual.members, ours.members))
+    )
+
+
+def _drawn(subregions: Subregions) -> UInt8[Array, "h w 4"]:
+    """The subregions in colours that blend as they do."""
+    turn = np.arange(len(subregions.names)) * 2.4
+    colours = 128 + 100 * np.cos(turn[:, None] + np.array([0, 2.1, 4.2]))
+    total = subregions.fades.sum(axis=2, keepdims=True)
+    mixed = subregions.fades @ colours.astype(np.float32) / np.maximum(total, 1e-6)
+    drawn: Array = np.dstack([mixed, 255 * np.minimum(total, 1)]).round().astype(np.uint8)
+    return drawn
+
+
+def _photo_file(example: Example) -> str:
+    return f"photos/{example.name}.png"
+
+
+def _write_png(path: Path, pixels: UInt8[Array, "h w c"]) -> None:
+    path.write_bytes(encode_image(pixels, "PNG"))
