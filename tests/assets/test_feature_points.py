@@ -14,7 +14,14 @@ import pytest
 from documents import put
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.assets.generic import load_generic_head
+from mien.capture.mediapipe_face import LEFT_IRIS, RIGHT_IRIS
 from mien.errors import FileFormatError, InputError
+
+LEFT_EYE = (
+    *("left_eye_inner", "left_eye_outer"),
+    *(f"left_upper_eyelid.{i}" for i in range(4)),
+    *(f"left_lower_eyelid.{i}" for i in range(3)),
+)
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +56,19 @@ def test_every_point_is_a_mix_of_landmarks(layout: FeatureLayout) -> None:
     np.testing.assert_allclose(layout.mixes.sum(axis=1), 1, atol=1e-12)
     assert (layout.mixes >= 0).all()
     assert np.linalg.matrix_rank(layout.mixes) >= 128  # Teeth come from the lips.
+
+
+def test_pupils_are_the_detectors_irises_in_all_sets_of_eyes(layout: FeatureLayout) -> None:
+    for side, landmark in (("right", RIGHT_IRIS), ("left", LEFT_IRIS)):
+        index = layout.index(f"{side}_pupil")
+        np.testing.assert_array_equal(layout.mixes[index], np.eye(478)[landmark])
+        sets = [
+            name
+            for names, level in zip(layout.set_names, layout.sets, strict=True)
+            for name, members in zip(names, level, strict=True)
+            if index in members
+        ]
+        assert sets == ["whole_face", f"{side}_eye_region", f"{side}_eyelids"]
 
 
 def test_mirrored_landmarks_give_mirrored_points(layout: FeatureLayout) -> None:
@@ -111,6 +131,7 @@ def test_triangles_cover_the_template_once_and_alike_on_both_sides(layout: Featu
             *(f"right_upper_lip_outer.{i}" for i in range(3)),
             "right_mouth_corner",
         ],
+        *(["left_pupil", corner] for corner in LEFT_EYE),
         ["lower_lip_inner", *(f"left_lower_lip_inner.{i}" for i in range(2))],
         ["menton", *(f"left_jaw.{i}" for i in range(3)), "left_temple"],
     ],

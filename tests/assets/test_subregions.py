@@ -153,8 +153,9 @@ def test_members_of_both_sides_are_mirror_images_and_all_points_have_a_place(
         assert mirrored == set(members[f"left_{name}"].tolist())
     assert set(np.concatenate(subregions.members).tolist()) == set(range(134))
     eye = {layout.names[i] for i in members["right_eye"]}
-    assert len(eye) == 9
-    assert all("eye" in name for name in eye)
+    assert len(eye) == 10
+    assert all("eye" in name or name == "right_pupil" for name in eye)
+    assert layout.index("right_pupil") in members["right_lids"]
 
 
 def test_members_do_not_depend_on_the_person(
@@ -182,6 +183,9 @@ def test_bad_calls_are_told(layout: FeatureLayout, points: np.ndarray) -> None:
         (put("regions", 2, "name", to="left_cheek"), r"regions\[2\]: 'left_cheek' appears twice"),
         (put("regions", 1, "mirror_of", to="nose"), "mirror_of: no subregion 'nose' before"),
         (put("regions", 0, "group", to="hair"), "right_cheek.group: unknown group 'hair'"),
+        (put("regions", 1, "group", to=[1]), "left_cheek.group: expected"),
+        (put("regions", 0, "also", to="chin"), "right_cheek.also: expected a list of points"),
+        (put("regions", 0, "also", to=["nos"]), "right_cheek.also: unknown point 'nos'"),
         (put("regions", 0, "corners", 1, to=3), r"right_cheek.corners\[1\]: expected an object"),
         (put("regions", 0, "corners", 1, to={"nos": 1}), r"corners\[1\]: unknown point 'nos'"),
         (put("regions", 0, "corners", 1, to={"chin": 0.5}), "shares that sum to 1, found 0.5"),
@@ -204,7 +208,12 @@ def test_a_bad_drawing_is_told_in_one_line(
 def test_a_users_drawing_is_used(layout: FeatureLayout, points: np.ndarray) -> None:
     drawing = load_subregion_drawing(layout)
     whole = replace(
-        drawing, names=("face",), groups=("skin",), corners=drawing.corners[:1], blends=(0.06,)
+        drawing,
+        names=("face",),
+        groups=("skin",),
+        corners=drawing.corners[:1],
+        blends=(0.06,),
+        also=drawing.also[:1],
     )
     subregions = default_subregions(layout, points, SIZE, drawing=whole)
     assert subregions.names == ("face",)

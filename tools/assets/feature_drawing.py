@@ -12,12 +12,13 @@ RIGHT: dict[str, list[int | tuple[int, int] | Mix]] = {
     "eye_outer": [33],
     "upper_eyelid": [157, 158, 159, 160],
     "lower_eyelid": [(153, 154), 145, (144, 163)],
+    "pupil": [468],
     "lid_fold": [56, (27, 28), 30],
     "eye_bag": [(231, 232), 229],
     "nose_side": [174],
     "nose_wing": [198, 49, 98, 97],
     "nasolabial": [203, (206, 216), 212],
-    "cheek": [101, 117, 205, 207],
+    "cheek": [101, 117, 207],
     "forehead": [(108, 69), 104],
     "hairline": [67, 54],
     "temple": [(162, 127)],
@@ -59,6 +60,12 @@ RIGHT_LINES = (
     "brow_lower.0 brow_lower.1 brow_lower.2",
     "eye_inner upper_eyelid.0 upper_eyelid.1 upper_eyelid.2 upper_eyelid.3 eye_outer",
     "eye_inner lower_eyelid.0 lower_eyelid.1 lower_eyelid.2 eye_outer",
+    # Only a pupil that leaves the lids then folds a triangle over.
+    "eye_inner pupil eye_outer",
+    "upper_eyelid.0 pupil lower_eyelid.0",
+    "upper_eyelid.1 pupil lower_eyelid.1",
+    "upper_eyelid.2 pupil lower_eyelid.2",
+    "upper_eyelid.3 pupil",
     "upper_lip_outer upper_lip_outer.0 upper_lip_outer.1 upper_lip_outer.2 mouth_corner",
     "lower_lip_outer lower_lip_outer.0 lower_lip_outer.1 lower_lip_outer.2 mouth_corner",
     "upper_lip_inner upper_lip_inner.0 upper_lip_inner.1 inner_mouth_corner mouth_corner",
@@ -73,7 +80,7 @@ RIGHT_LINES = (
 """A name on its own is the midline's where there is one, else the side's."""
 
 # The sets below the whole face. SIDE stands for right and for left; a group's name for all of it.
-EYE = "SIDE_eye_inner SIDE_eye_outer SIDE_upper_eyelid SIDE_lower_eyelid SIDE_lid_fold"
+EYE = "SIDE_eye_inner SIDE_eye_outer SIDE_upper_eyelid SIDE_lower_eyelid SIDE_pupil SIDE_lid_fold"
 BROW = "SIDE_brow_upper SIDE_brow_lower"
 OUTER = "SIDE_mouth_corner SIDE_upper_lip_outer SIDE_lower_lip_outer"
 INNER = "SIDE_inner_mouth_corner SIDE_upper_lip_inner SIDE_lower_lip_inner"
@@ -83,11 +90,11 @@ SETS: dict[int, dict[str, str]] = {
         "SIDE_eye_region": f"{BROW} {EYE} SIDE_eye_bag SIDE_forehead SIDE_hairline SIDE_temple "
         "SIDE_cheek.0 SIDE_cheek.1 hairline forehead glabella nose_root",
         "nose_region": "glabella nose_root nose_bridge nose_tip nose_base SIDE_eye_inner "
-        "SIDE_nose_side SIDE_nose_wing SIDE_nasolabial.0 SIDE_cheek.0 SIDE_cheek.2 "
+        "SIDE_nose_side SIDE_nose_wing SIDE_nasolabial.0 SIDE_cheek.0 "
         "SIDE_upper_lip_skin upper_lip_outer",
         "mouth_region": f"{OUTER} {INNER} {TEETH} upper_lip_outer upper_lip_inner upper_teeth "
         "lower_teeth lower_lip_inner lower_lip_outer chin_crease chin menton nose_base "
-        "SIDE_nose_wing.2 SIDE_nose_wing.3 SIDE_nasolabial SIDE_cheek.2 SIDE_cheek.3 SIDE_jaw "
+        "SIDE_nose_wing.2 SIDE_nose_wing.3 SIDE_nasolabial SIDE_cheek.2 SIDE_jaw "
         "SIDE_upper_lip_skin SIDE_lower_lip_skin SIDE_chin",
     },
     2: {
@@ -103,7 +110,7 @@ SETS: dict[int, dict[str, str]] = {
         "SIDE_nasolabial.0",
         "SIDE_mouth_corner": "SIDE_mouth_corner SIDE_inner_mouth_corner SIDE_upper_lip_outer.1 "
         "SIDE_upper_lip_outer.2 SIDE_lower_lip_outer.1 SIDE_lower_lip_outer.2 SIDE_nasolabial.1 "
-        "SIDE_nasolabial.2 SIDE_cheek.3",
+        "SIDE_nasolabial.2 SIDE_cheek.2",
         "upper_lip": "upper_lip_outer upper_lip_inner nose_base SIDE_mouth_corner "
         "SIDE_inner_mouth_corner SIDE_upper_lip_outer SIDE_upper_lip_inner SIDE_upper_lip_skin "
         "SIDE_nose_wing.3",

@@ -33,12 +33,14 @@ class SubregionDrawing:
             group fades out around the face.
         corners: of each polygon, (c, n + k): mixes of the layout's points and its frame's.
         blends: width of the blend along each one's borders, in widths of the face; one a group.
+        also: of each, points that tell about it, wherever they lie.
     """
 
     names: tuple[str, ...]
     groups: tuple[str, ...]
     corners: tuple[Float[Array, "c points"], ...]
     blends: tuple[float, ...]
+    also: tuple[Int[Array, " a"], ...]
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,8 @@ class Subregions:
         names: R of them, teeth last.
         fades: (h, w, R) float32, each pixel's shares; they sum to 1 inside of the face and fall
             to 0 around it.
-        members: of each, the indices of the feature points within it or on its boundary.
+        members: of each, the indices of the feature points within it or on its boundary, and of
+            others that tell about it: lids follow the pupil.
     """
 
     names: tuple[str, ...]
@@ -133,16 +136,20 @@ def _distance_to(mask: Bool[Array, "h w"]) -> Float[Array, "h w"]:
 
 
 def _members(layout: FeatureLayout, drawing: SubregionDrawing) -> tuple[Int[Array, " m"], ...]:
-    """Points within a subregion or where it blends, found on the template: the same for all."""
+    """Points within a subregion or where it blends, found on the template: the same for all.
+
+    And those that are named for it.
+    """
     low = np.minimum(layout.template.min(axis=0), layout.surround.min(axis=0))
     points = (layout.template - low) * _TEMPLATE_WIDTH_PX
     size = np.ceil((layout.surround.max(axis=0) - low) * _TEMPLATE_WIDTH_PX).astype(int) + 1
     labels = _painted(layout, drawing, points, (int(size[0]), int(size[1])))
     columns, rows = np.floor(points).astype(int).T
     members = []
-    for region, blend in enumerate(drawing.blends):
+    for region, (blend, also) in enumerate(zip(drawing.blends, drawing.also, strict=True)):
         distances = _distance_to(labels == region)[rows, columns]
-        members.append(frozen(np.flatnonzero(distances <= blend / 2 * _TEMPLATE_WIDTH_PX)))
+        within = np.flatnonzero(distances <= blend / 2 * _TEMPLATE_WIDTH_PX)
+        members.append(frozen(np.union1d(within, also)))
     return tuple(members)
 
 
@@ -157,36 +164,59 @@ def load_subregion_drawing(
     return read_data(Path(path or shipped), FORMAT, lambda document: _drawing(document, layout))
 
 
+@dataclass(frozen=True)
+class _Region:
+    group: str
+    corners: Float[Array, "c points"]
+    also: Int[Array, " a"]
+
+
 def _drawing(document: dict[str, Any], layout: FeatureLayout) -> SubregionDrawing:
     if need(document, "layout", str) != layout.name:
         problem = f"expected {layout.name!r}, found {document['layout'][:40]!r}"
         raise Broken("layout", problem)
     blends = {k: _width(v, f"groups.{k}") for k, v in need(document, "groups", dict).items()}
-    polygons: dict[str, Array] = {}
-    groups: dict[str, str] = {}
-    for number, region in enumerate(need(document, "regions", list)):
-        name = need(region, "name", str, f"regions[{number}]")
-        if name in polygons:
+    regions: dict[str, _Region] = {}
+    for number, entry in enumerate(need(document, "regions", list)):
+        name = need(entry, "name", str, f"regions[{number}]")
+        if name in regions:
             raise Broken(f"regions[{number}]", f"{name!r} appears twice")
-        if "mirror_of" in region:
-            original = need(region, "mirror_of", str, name)
-            if original not in polygons:
-                raise Broken(f"{name}.mirror_of", f"no subregion {original!r} before this one")
-            polygons[name] = _mirrored(polygons[original], layout)
-            groups[name] = region.get("group", groups[original])
-        else:
-            polygons[name] = _polygon(region, name, layout)
-            groups[name] = need(region, "group", str, name)
-        if groups[name] not in blends:
-            raise Broken(f"{name}.group", f"unknown group {str(groups[name])[:40]!r}")
-    if not polygons:
+        regions[name] = region = _region(entry, name, regions, layout)
+        if region.group not in blends:
+            raise Broken(f"{name}.group", f"unknown group {region.group[:40]!r}")
+    if not regions:
         raise Broken("regions", "expected at least one")
     return SubregionDrawing(
-        names=tuple(polygons),
-        groups=tuple(groups.values()),
-        corners=tuple(map(frozen, polygons.values())),
-        blends=tuple(blends[group] for group in groups.values()),
+        names=tuple(regions),
+        groups=tuple(region.group for region in regions.values()),
+        corners=tuple(frozen(region.corners) for region in regions.values()),
+        blends=tuple(blends[region.group] for region in regions.values()),
+        also=tuple(frozen(region.also) for region in regions.values()),
     )
+
+
+def _region(
+    entry: dict[str, Any], name: str, before: dict[str, _Region], layout: FeatureLayout
+) -> _Region:
+    """As drawn, or one of those before it on the other side of the face."""
+    if "mirror_of" not in entry:
+        also = _points(entry["also"], f"{name}.also", layout) if "also" in entry else []
+        group = need(entry, "group", str, name)
+        return _Region(group, _polygon(entry, name, layout), np.array(also, dtype=np.intp))
+    original = before.get(need(entry, "mirror_of", str, name))
+    if original is None:
+        raise Broken(f"{name}.mirror_of", f"no subregion {entry['mirror_of']!r} before this one")
+    group = need(entry, "group", str, name) if "group" in entry else original.group
+    return _Region(group, _mirrored(original.corners, layout), layout.mirror[original.also])
+
+
+def _points(members: Any, place: str, layout: FeatureLayout) -> list[int]:
+    if not isinstance(members, list):
+        raise Broken(place, "expected a list of points")
+    for member in members:
+        if member not in layout.names:
+            raise Broken(place, f"unknown point {str(member)[:40]!r}")
+    return [layout.index(member) for member in members]
 
 
 def _width(value: Any, place: str) -> float:
