@@ -82,6 +82,24 @@ def test_one_or_two_points_move_a_face_whose_head_is_still(person, count):
     assert np.linalg.norm(completed - neutral, axis=1).mean() > 0.5
 
 
+def test_three_points_that_shift_are_a_head_that_moved_or_an_expression(person):
+    """What is told of the head is no expression: alike wherever the head is. A still one is not."""
+    example_set, _ = person
+    neutral = example_set.neutral.points
+    names = ("right_mouth_corner", "left_mouth_corner", "menton")
+    known = np.array([example_set.layout.index(name) for name in names])
+    synthesizer = Synthesizer(example_set)
+
+    def shifted(by, head):
+        return synthesizer.complete(known, neutral[known] + by, head=head)
+
+    told = shifted([0, -3], "told") - shifted([0, 0], "told")
+    np.testing.assert_allclose(told, np.broadcast_to([0, -3], told.shape), atol=1e-6)
+    still = shifted([0, -3], "still") - shifted([0, 0], "still")
+    assert np.linalg.norm(still - [0, -3], axis=1).mean() > 1
+    np.testing.assert_allclose(still[known], told[known], atol=1e-6)
+
+
 def test_all_points_stay_where_they_are(person):
     truth = MOVED(new_expression(person))
     completed = Synthesizer(person[0]).complete(np.arange(len(truth)), truth)
@@ -141,6 +159,19 @@ def test_head_motion_is_no_expression(person):
     np.testing.assert_allclose(still.hull_px, moved.hull_px, atol=1e-6)
 
 
+def test_a_moved_head_is_drawn_where_it_is(person):
+    """The picture of a shifted head is the shifted picture of the still one."""
+    synthesizer = Synthesizer(person[0])
+    points = new_expression(person)
+    still = synthesizer.synthesize(points).image
+    shift = PlanarMotion(np.array(1.0), np.array(0.0), np.array([7.0, 4.0]))
+    moved = synthesizer.synthesize(shift(points), motion=shift, size=(WIDTH + 30, HEIGHT)).image
+    assert moved.shape == (HEIGHT, WIDTH + 30, 3)
+    difference = moved[4:, 7 : WIDTH + 7].astype(int) - still[:-4]
+    assert np.abs(difference).mean() < 0.1
+    np.testing.assert_allclose(synthesizer.head_motion(shift(points)).a, 1, atol=0.1)
+
+
 def test_the_picture_is_drawn_into_memory_that_is_given(person):
     out = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     made = Synthesizer(person[0]).synthesize(new_expression(person), out=out)
@@ -157,6 +188,8 @@ def test_bad_options_and_points(person):
     with pytest.raises(InputError, match="propagation: expected closed-form or printed, got pca"):
         SynthesisOptions(propagation="pca")
     synthesizer = Synthesizer(person[0])
+    with pytest.raises(InputError, match="head: expected told or still, got moved"):
+        synthesizer.complete(np.array([3]), np.zeros((1, 2)), head="moved")
     with pytest.raises(InputError, match="known: expected each point once, got point 3 twice"):
         synthesizer.complete(np.array([3, 3, 4]), np.zeros((3, 2)))
     with pytest.raises(EstimationError, match="share a place"):

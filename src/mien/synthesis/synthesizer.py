@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -19,8 +19,16 @@ from mien.synthesis.inferred import Inference, check_known
 from mien.synthesis.motion import PlanarMotion, compensated, estimate_planar_motion
 from mien.synthesis.propagate import Propagation
 
-__all__ = ["LEAST_TELLING", "PropagationName", "Synthesis", "SynthesisOptions", "Synthesizer"]
+__all__ = [
+    "LEAST_TELLING",
+    "HeadMotion",
+    "PropagationName",
+    "Synthesis",
+    "SynthesisOptions",
+    "Synthesizer",
+]
 
+HeadMotion = Literal["told", "still"]
 PropagationName = Literal["closed-form", "printed"]
 
 LEAST_TELLING = 3
@@ -47,9 +55,7 @@ class SynthesisOptions:
 
     def __post_init__(self) -> None:
         """Check the name."""
-        names = get_args(PropagationName)
-        if self.propagation not in names:
-            raise InputError("propagation", " or ".join(names), self.propagation)
+        _checked(self.propagation, PropagationName, "propagation")
 
     @classmethod
     def paper(cls) -> SynthesisOptions:
@@ -90,20 +96,24 @@ class Synthesizer:
         self.examples = examples
         self.options = options or SynthesisOptions()
         self._composer = Composer(examples)
-        self._inferences: OrderedDict[bytes, Inference] = OrderedDict()
+        self._inferences: OrderedDict[tuple[bytes, bool], Inference] = OrderedDict()
 
     def complete(
-        self, known: Int[Array, " k"], positions: Float[Array, "k 2"]
+        self, known: Int[Array, " k"], positions: Float[Array, "k 2"], *, head: HeadMotion = "told"
     ) -> Float[Array, "n 2"]:
         """Where all points are, given where some are.
 
-        How the head moved is told by the known points, both here and in the expressions that are
-        learned from. One or two cannot tell it: then the head is where the neutral photo has it.
         The first call for a set of known points takes longer than those that follow.
 
         Args:
             known: indices of points, none twice.
             positions: (k, 2) px of the neutral photo.
+            head: "told": how the head moved is told by the known points, both here and in the
+                expressions that are learned from; one or two cannot tell it, and leave the head
+                still. "still": it is where the neutral photo has it, as when someone drags points
+                there. A few points of a still head must not tell its motion: of three at the
+                mouth the others are then 8 px off, where they are 2 px off otherwise (d10). For a
+                moved head the opposite is far worse; `plausible.head_moved` tells which.
         Returns: (n, 2) px of the neutral photo; the known points exactly where they were given.
         Raises: InputError: no points, unknown or repeated ones, shapes, NaN, fewer than two
             expressions to learn from. EstimationError: all points in one place.
@@ -111,7 +121,7 @@ class Synthesizer:
         """
         neutral = self.examples.neutral.points
         known, positions = check_known(known, positions, len(neutral))
-        told = len(known) >= LEAST_TELLING
+        told = _checked(head, HeadMotion, "head") == "told" and len(known) >= LEAST_TELLING
         motion = estimate_planar_motion(neutral[known], positions) if told else None
         still = positions if motion is None else motion.undo(positions)
         inferred = self._inference(known, told).infer(known, still - neutral[known])
@@ -120,6 +130,10 @@ class Synthesizer:
             completed = motion(completed)
         completed[known] = positions
         return completed
+
+    def head_motion(self, points: Float[Array, "n 2"]) -> PlanarMotion:
+        """What the head did from the neutral photo to another; as `Composer.head_motion`."""
+        return self._composer.head_motion(points)
 
     def synthesize(
         self,
@@ -146,15 +160,13 @@ class Synthesizer:
             slack=self.options.slack,
             together=self.options.together,
         )
-        place: dict[str, Any] = {"motion": motion, "size": size}
-        given = {name: value for name, value in place.items() if value is not None}
-        image = self._composer.render(points, shares, out=out, **given)
+        image = self._composer.render(points, shares, motion=motion, size=size, out=out)
         missed = _missed(self.examples, points, shares)
         return Synthesis(image, frozen(np.array(points, float)), frozen(shares), frozen(missed))
 
     def _inference(self, known: Int[Array, " k"], told: bool) -> Inference:
         """What completes this set of points; the latest few sets are remembered."""
-        key = known.astype(np.int64).tobytes()
+        key = (known.tobytes(), told)
         if key not in self._inferences:
             self._inferences[key] = self._learned(known if told else None)
         self._inferences.move_to_end(key)
@@ -178,3 +190,10 @@ def _missed(
     parts = zip(shares, examples.subregions.members, strict=True)
     rows = [np.tensordot(row, apart[:, members], axes=1) for row, members in parts]
     return np.array([np.sqrt((row**2).sum(axis=1).mean()) for row in rows])
+
+
+def _checked(value: str, choices: object, name: str) -> str:
+    names = get_args(choices)
+    if value not in names:
+        raise InputError(name, " or ".join(names), value)
+    return value
