@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mien.arrays import Array, Float, UInt8
+from mien.arrays import Array, Float, Int, UInt8
 from mien.capture.detector import LandmarkDetector, look_twice
 from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
 from mien.capture.frame_choice import FrameScores
@@ -40,6 +40,7 @@ class FaceSeries:
         names: of the pictures: `frame_000123.png`, `smile.jpg`, or `joy/smile.jpg` in a folder of
             one folder an expression.
         landmarks: (N, 478, 2) px of the picture as `load_pictures` gives it.
+        sizes: (N, 2) their widths and heights, px.
         scores: of the same; `index` counts frames or photos from 0.
         max_side: px; larger pictures are reduced to it.
         left_out: why, by name, of the pictures in which no face can be used.
@@ -51,6 +52,7 @@ class FaceSeries:
     files: tuple[Path, ...]
     names: tuple[str, ...]
     landmarks: Float[Array, "n 478 2"]
+    sizes: Int[Array, "n 2"]
     scores: FrameScores
     max_side: int
     left_out: dict[str, str]
@@ -118,6 +120,7 @@ class _Gathered:
         self.files: list[Path] = []
         self.names: list[str] = []
         self.landmarks: list[Array] = []
+        self.sizes: list[tuple[int, int]] = []
         self.rows: list[tuple[int, float, DetectedFace]] = []
         self.left_out: dict[str, str] = {}
         self.notes: list[str] = []
@@ -175,6 +178,7 @@ class _Gathered:
         points = found.points[:, :2]
         self.names.append(name)
         self.landmarks.append(points)
+        self.sizes.append((pixels.shape[1], pixels.shape[0]))
         self.rows.append((number, face_sharpness(pixels, points), found))
         self.look(pixels, points)
 
@@ -191,6 +195,7 @@ class _Gathered:
             tuple(self.files),
             tuple(self.names),
             np.stack(self.landmarks),
+            np.array(self.sizes),
             FrameScores.of(*zip(*self.rows, strict=True)),
             self.max_side,
             self.left_out,

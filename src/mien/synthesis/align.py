@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8
-from mien.numeric.raster import Raster
-from mien.numeric.warp import triangulated
+from mien.numeric.raster import Raster, rasterize
 from mien.synthesis.examples import ExampleSet
 
 __all__ = ["aligned_photos", "warped"]
@@ -25,7 +24,7 @@ def aligned_photos(examples: ExampleSet) -> Iterator[UInt8[Array, "h w 4"]]:
     standard = examples.examples[examples.standard]
     height, width = standard.photo.shape[:2]
     framed = np.concatenate([standard.points, layout.frame(standard.points)])
-    raster = triangulated(framed, layout.triangles, width, height)
+    raster = rasterize(framed, np.ones(len(framed)), layout.triangles, width, height)
     alpha = np.where(raster.mask, 255, 0).astype(np.uint8)
     for example in examples.examples:
         points = np.concatenate([example.points, layout.frame(example.points)])
