@@ -371,3 +371,29 @@ def test_one_state_is_one_face() -> None:
     for again in (RIG.evaluate(state), Rig(head_of()).evaluate(state)):
         for field in ("vertices", "weights", "brightness"):
             assert getattr(again, field).tobytes() == getattr(first, field).tobytes()
+
+
+def test_every_vertex_may_have_weights_of_its_own() -> None:
+    weights = np.zeros((len(REST), 4))
+    weights[:, 0] = 1
+    joyful = REST[:, 0] > 5
+    weights[joyful] = np.eye(4)[RIG.names.index("joy")]
+    face = RIG.mixed(weights, contacts=False)
+    expected = np.where(joyful[:, None], SHAPES["joy"], REST)
+    np.testing.assert_allclose(face.vertices, expected, atol=1e-9)
+    np.testing.assert_array_equal(face.weights, weights)
+
+
+def test_offsets_move_the_mixed_face_on(rng: np.random.Generator) -> None:
+    weights = np.tile(np.eye(4)[1], (len(REST), 1))
+    offsets = rng.normal(size=REST.shape)
+    face = RIG.mixed(weights, offsets, contacts=False)
+    name = RIG.names[1]
+    np.testing.assert_allclose(face.vertices, SHAPES[name] + offsets, atol=1e-9)
+
+
+def test_bad_weights_by_vertex_are_refused() -> None:
+    with pytest.raises(InputError, match="weights: expected shape"):
+        RIG.mixed(np.ones((4, 4)))
+    with pytest.raises(InputError, match="offsets: expected shape"):
+        RIG.mixed(np.tile(np.eye(4)[1], (len(REST), 1)), np.zeros((3, 3)))

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from mien.arrays import Array, Float, Int, UInt8
+from mien.arrays import Array, Float, Int, UInt8, check_array
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.errors import InputError
 from mien.expressions.basis import WEIGHT_RANGE, check_weights, outside_hull
@@ -103,17 +103,42 @@ class Rig:
         weights = self._shares @ by_region
         moved = bool(units.any() or gaze.any())
         if not moved and _one_expression(by_region):
-            vertices = self._photographed[int(by_region[0].argmax())]
-            return PosedFace(vertices, weights, self._brightness(vertices, weights))
-        vertices = self._neutral.copy()
-        add_mixture(weights[:, 1:], self.offsets[1:], vertices)
-        self._look_as_photographed(vertices, weights)
+            return self._as_photographed(weights)
+        vertices = self._mixed(weights)
         driven = self._explained.driven(units) * np.clip(by_region[:, :1], 0, 1)
         if driven.any():
             along = self._skin_shares @ np.column_stack([-driven.sum(axis=1), driven])
             add_mixture(along[:, 1:], self._explained.left_over[1:], vertices)
             weights += along
         vertices = self._mechanics.applied(vertices, units, gaze, contacts=contacts)
+        return PosedFace(vertices, weights, self._brightness(vertices, weights))
+
+    def mixed(
+        self,
+        weights: Float[Array, "v k"],
+        offsets: Float[Array, "v 3"] | None = None,
+        *,
+        contacts: bool = True,
+    ) -> PosedFace:
+        """The face whose every vertex mixes the photographed expressions by weights of its own.
+
+        One expression at weight 1 everywhere is that expression exactly, as photographed.
+
+        Args:
+            weights: (V, K) that sum to 1; alike within an eyeball.
+            offsets: (V, 3) mm, how the mixed face moves on.
+            contacts: as for evaluate.
+        Raises: InputError: shape, not finite.
+        """
+        shape = (len(self._neutral), len(self.names))
+        weights = check_array("weights", weights, shape)
+        if offsets is None and _one_expression(weights):
+            return self._as_photographed(weights)
+        vertices = self._mixed(weights)
+        if offsets is not None:
+            vertices += check_array("offsets", offsets, vertices.shape)
+        still = np.zeros(len(self.unit_names))
+        vertices = self._mechanics.applied(vertices, still, contacts=contacts)
         return PosedFace(vertices, weights, self._brightness(vertices, weights))
 
     def mask(self, region: str) -> Float[Array, " v"]:
@@ -174,6 +199,17 @@ class Rig:
             still[eyeball.vertices] = self._neutral[eyeball.vertices]
         return still
 
+    def _as_photographed(self, weights: Float[Array, "v k"]) -> PosedFace:
+        """The expression that has weight 1 everywhere."""
+        vertices = self._photographed[int(weights[0].argmax())]
+        return PosedFace(vertices, weights, self._brightness(vertices, weights))
+
+    def _mixed(self, weights: Float[Array, "v k"]) -> Float[Array, "v 3"]:
+        vertices = self._neutral.copy()
+        add_mixture(weights[:, 1:], self.offsets[1:], vertices)
+        self._look_as_photographed(vertices, weights)
+        return vertices
+
     def _look_as_photographed(
         self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
     ) -> None:
@@ -230,9 +266,9 @@ def _shaded_parts(generic: GenericHead) -> tuple[Array, Array, Array]:
     )
 
 
-def _one_expression(by_region: Float[Array, "r k"]) -> bool:
+def _one_expression(weights: Float[Array, "n k"]) -> bool:
     """Whether the face is one photographed expression, everywhere the same."""
-    return bool((by_region == by_region[0]).all() and np.count_nonzero(by_region[0]) == 1)
+    return bool(np.count_nonzero(weights[0]) == 1 and (weights == weights[0]).all())
 
 
 def _check_known(what: str, name: str, known: Iterable[str]) -> None:
