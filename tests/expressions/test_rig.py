@@ -9,7 +9,7 @@ from marbled import GENERIC, at
 from mien.arrays import Array
 from mien.errors import InputError
 from mien.expressions.followers import part_vertices
-from mien.expressions.gaze import Eyeball, look_angles
+from mien.expressions.gaze import Eyeball, look_angles, with_turned_eyes
 from mien.expressions.regions import default_masks
 from mien.expressions.rig import REGIONS as MIXED_REGIONS
 from mien.expressions.rig import Rig, region_rows
@@ -397,3 +397,10 @@ def test_bad_weights_by_vertex_are_refused() -> None:
         RIG.mixed(np.ones((4, 4)))
     with pytest.raises(InputError, match="offsets: expected shape"):
         RIG.mixed(np.tile(np.eye(4)[1], (len(REST), 1)), np.zeros((3, 3)))
+
+
+def test_eyes_turn_on_from_where_the_mixture_looks() -> None:
+    turn = np.array([[0.2, 0.05], [0.1, 0.0]])
+    face = RIG.mixed(np.tile(only("joy"), (len(REST), 1)), turn=turn, contacts=False)
+    expected = with_turned_eyes(SHAPES["joy"], turn, GENERIC)
+    np.testing.assert_allclose(face.vertices, expected, atol=1e-9)

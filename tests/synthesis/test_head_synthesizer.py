@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from marbled import GENERIC
 from mien.errors import InputError
+from mien.expressions.gaze import with_turned_eyes
 from mien.model.head import NEUTRAL, Expression
 from mien.render.morph import MorphRenderer
 from mien.render.orbit import orbit_camera
@@ -84,6 +86,15 @@ def test_the_face_reaches_points_that_no_mix_has():
     found = feature_points_on(near.face.vertices)
     np.testing.assert_allclose(found[brow], points[brow], atol=0.1)
     assert np.abs(feature_points_on(plain.face.vertices)[brow] - points[brow]).max() > 1
+
+
+def test_eyes_look_where_their_pupils_are():
+    looking = with_turned_eyes(REST, np.array([[0.3, 0.1], [0.2, 0.0]]), GENERIC)
+    points = points_of("joy").copy()
+    pupils = named("left_pupil", "right_pupil")
+    points[pupils] = feature_points_on(looking)[pupils]
+    face = HEAD.synthesize(points).face
+    np.testing.assert_allclose(feature_points_on(face.vertices)[pupils], points[pupils], atol=0.1)
 
 
 def test_some_points_tell_all():

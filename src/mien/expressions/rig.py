@@ -118,6 +118,7 @@ class Rig:
         weights: Float[Array, "v k"],
         offsets: Float[Array, "v 3"] | None = None,
         *,
+        turn: Float[Array, "2 2"] | None = None,
         contacts: bool = True,
     ) -> PosedFace:
         """The face whose every vertex mixes the photographed expressions by weights of its own.
@@ -127,14 +128,17 @@ class Rig:
         Args:
             weights: (V, K) that sum to 1; alike within an eyeball.
             offsets: (V, 3) mm, how the mixed face moves on.
+            turn: radians, yaw and pitch by which the left and the right eye turn on.
             contacts: as for evaluate.
         Raises: InputError: shape, not finite.
         """
         shape = (len(self._neutral), len(self.names))
         weights = check_array("weights", weights, shape)
-        if offsets is None and _one_expression(weights):
+        if offsets is None and turn is None and _one_expression(weights):
             return self._as_photographed(weights)
         vertices = self._mixed(weights)
+        if turn is not None:
+            self._mechanics.look.turn(vertices, check_array("turn", turn, (2, 2)))
         if offsets is not None:
             vertices += check_array("offsets", offsets, vertices.shape)
         still = np.zeros(len(self.unit_names))

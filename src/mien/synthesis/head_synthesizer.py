@@ -8,8 +8,12 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array, frozen
 from mien.assets.feature_points import load_feature_layout
+from mien.assets.generic import load_generic_head
+from mien.expressions.followers import part_vertices
+from mien.expressions.gaze import SIDES
 from mien.expressions.rig import Rig
 from mien.expressions.state import PosedFace
+from mien.model.expression.gaze import MOST_RAD, yaw_pitch_of
 from mien.model.head import Head
 from mien.synthesis.coefficients import coefficients_of, distances_of
 from mien.synthesis.conditional import ConditionalMotion
@@ -60,8 +64,8 @@ class HeadSynthesizer:
     Args:
         head: with the generic head's mesh.
         options: beyond the paper or not.
-        reach: whether the skin is moved on to where the points were asked for, as pictures are
-            warped; the paper leaves it where the mix of examples has it.
+        reach: whether skin and eyes are moved on to where the points were asked for, as pictures
+            are warped; the paper leaves them where the mix of examples has them.
         rig: of the head, if there is one already.
     Raises: InputError: as `Rig`.
     Source: Z06 sections 6, 7, 9, 10.
@@ -139,7 +143,21 @@ class HeadSynthesizer:
         missing = points - feature_points_on(mixed.vertices)
         if np.abs(missing).max() < _NEAR_MM:
             return self.rig.mixed(weights)
-        return self.rig.mixed(weights, skin_with_points() @ missing)
+        turn = self._turn(mixed.vertices, points)
+        return self.rig.mixed(weights, skin_with_points() @ missing, turn=turn)
+
+    def _turn(
+        self, vertices: Float[Array, "v 3"], points: Float[Array, "n 3"]
+    ) -> Float[Array, "2 2"]:
+        """(2, 2) rad, how the eyes of a face turn on until the pupils are where points say."""
+        balls = [part_vertices(load_generic_head(), f"{side}_eyeball") for side in SIDES]
+        centres = np.array([vertices[ball].mean(axis=0) for ball in balls])
+        pupils = [self.layout.index(f"{side}_pupil") for side in SIDES]
+        towards = np.stack([points[pupils], feature_points_on(vertices)[pupils]]) - centres
+        towards /= np.linalg.norm(towards, axis=2, keepdims=True)
+        wanted, found = map(yaw_pitch_of, towards)
+        turn: Array = np.clip(wanted - found, -MOST_RAD, MOST_RAD)
+        return turn
 
     def _learned(self) -> Inference:
         moves = np.concatenate([self.examples[1:] - self.examples[0], self._units])
