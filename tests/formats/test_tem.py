@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from mien.formats.tem import (
     read_tem,
     write_tem,
 )
+from mien.formats.tem_templates import TEMPLATES
 
 SMALL = "3\n1.5\t2\n3 4\n5\t6\n2\n0\n2\n0 1\n1\n4\n0 1 2 0\n"
 
@@ -92,22 +94,39 @@ def test_bad_values_are_not_written(tmp_path: Path) -> None:
 
 
 def test_another_template_is_told() -> None:
-    with pytest.raises(FileFormatError, match=r"a.tem: expected 134 points .*, found 83"):
-        points_from_tem(Delineation(np.zeros((83, 2)), ()), load_feature_layout(), "a.tem")
+    delineation = Delineation(np.zeros((70, 2)), ())
+    with pytest.raises(FileFormatError) as raised:
+        points_from_tem(delineation, load_feature_layout(), "a.tem")
+    assert str(raised.value) == (
+        "a.tem: expected 134 points (zhang134), 83 (Face++), 106 (Face++), "
+        "189 (Face Research Lab), found 70"
+    )
 
 
-def test_the_face_research_labs_template_is_understood(shared: Path) -> None:
-    """Hand-marked points of the real template lie where their names say."""
-    found = read_tem(shared / "data" / "london" / "001_03.tem")
-    assert len(found.points) == 189
-    named = points_from_tem(found, load_feature_layout())
+@pytest.mark.parametrize("count", TEMPLATES)
+def test_templates_name_points_of_the_layout_on_both_sides(count: int) -> None:
+    layout, shared = load_feature_layout(), TEMPLATES[count].shared
+    assert len(set(shared.values())) == len(shared)
+    assert 0 <= min(shared.values()) <= max(shared.values()) < count
+    assert {layout.names[layout.mirror[layout.index(name)]] for name in shared} == set(shared)
+
+
+@pytest.mark.parametrize(
+    "name", ["london/001_03", "lisa/15cm", "lisa/45cm", "lisa/lisa1", "lisa/lisa4"]
+)
+def test_real_templates_lie_where_their_names_say(shared: Path, name: str) -> None:
+    layout = load_feature_layout()
+    named = points_from_tem(read_tem(shared / "data" / f"{name}.tem"), layout)
     width = named["left_eye_outer"][0] - named["right_eye_outer"][0]
     assert width > 0
-    layout = load_feature_layout()
-    names = list(named)
-    places = layout.template[[layout.index(name) for name in names]]
-    marked = np.array([named[name] for name in names])
-    # An affine map of the template (its mouth is open) explains them to a few per cent.
+    for side in ("right", "left"):
+        inner, outer = named[f"{side}_eye_inner"], named[f"{side}_eye_outer"]
+        assert np.linalg.norm(named[f"{side}_pupil"] - (inner + outer) / 2) < 0.06 * width
+    # An affine map of the template explains them to a few per cent; its mouth is open.
+    still = [name for name in named if not re.search("lip|mouth|menton", name)]
+    places = layout.template[[layout.index(name) for name in still]]
+    marked = np.array([named[name] for name in still])
     design = np.column_stack([places, np.ones(len(places))])
     fitted = design @ np.linalg.lstsq(design, marked, rcond=None)[0]
-    assert np.abs(fitted - marked).max() < 0.15 * width
+    assert np.abs(fitted - marked).max() < 0.06 * width
+    assert named["upper_lip_inner"][1] <= named["lower_lip_inner"][1]

@@ -12,42 +12,10 @@ from mien.arrays import Array, Float, Int, check_array
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import FileFormatError, InputError
 from mien.formats.atomic import atomic_file
+from mien.formats.tem_templates import TEMPLATES
 from mien.formats.text_numbers import Numbers
 
 __all__ = ["Delineation", "TemLine", "points_from_tem", "points_to_tem", "read_tem", "write_tem"]
-
-FRL_COUNT = 189
-FRL_SHARED = {
-    "right_eye_outer": 18,
-    "right_eye_inner": 22,
-    "left_eye_inner": 23,
-    "left_eye_outer": 27,
-    "right_lower_eyelid.0": 30,
-    "right_lower_eyelid.1": 29,
-    "right_lower_eyelid.2": 28,
-    "left_lower_eyelid.0": 31,
-    "left_lower_eyelid.1": 32,
-    "left_lower_eyelid.2": 33,
-    "right_lid_fold.1": 36,
-    "left_lid_fold.1": 41,
-    "right_nose_wing.1": 62,
-    "left_nose_wing.1": 67,
-    "nose_base": 55,
-    "right_mouth_corner": 87,
-    "left_mouth_corner": 93,
-    "right_upper_lip_outer.0": 89,
-    "upper_lip_outer": 90,
-    "left_upper_lip_outer.0": 91,
-    "upper_lip_inner": 96,
-    "lower_lip_inner": 101,
-    "lower_lip_outer": 106,
-    "menton": 129,
-}
-"""What zhang134 shares with the Face Research Lab's template of 189 points, WebMorph's own.
-
-Hand-marked faces and the detector agree on these to 3 % of the distance between the outer corners
-of the eyes; tails of brows and rims of nostrils look alike but lie 4 to 8 % apart.
-"""
 
 
 @dataclass(frozen=True)
@@ -124,17 +92,18 @@ def points_to_tem(layout: FeatureLayout, points: Float[Array, "n 2"]) -> Delinea
 def points_from_tem(
     delineation: Delineation, layout: FeatureLayout, name: str | Path = "delineation"
 ) -> dict[str, Float[Array, " 2"]]:
-    """The points of a layout that a delineation holds: all of its own, or those shared with FRL's.
+    """The points of a layout that a delineation holds: all of its own, or those shared with others.
 
     Args:
         name: of the file, for messages.
-    Raises: FileFormatError: another template.
+    Raises: FileFormatError: a template that is not in `TEMPLATES`.
     """
     count = len(delineation.points)
     if count == len(layout.names):
         return dict(zip(layout.names, delineation.points, strict=True))
-    if count == FRL_COUNT:
-        shared = {n: i for n, i in FRL_SHARED.items() if n in layout.names}
+    if count in TEMPLATES:
+        shared = {n: i for n, i in TEMPLATES[count].shared.items() if n in layout.names}
         return {name: delineation.points[index] for name, index in shared.items()}
-    expected = f"{len(layout.names)} points ({layout.name}) or {FRL_COUNT} (Face Research Lab)"
+    known = [f"{known} ({template.origin})" for known, template in TEMPLATES.items()]
+    expected = f"{len(layout.names)} points ({layout.name}), {', '.join(known)}"
     raise FileFormatError(name, f"expected {expected}, found {count}")
