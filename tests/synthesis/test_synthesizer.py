@@ -187,6 +187,10 @@ def test_the_paper_has_none_of_the_additions():
 def test_bad_options_and_points(person):
     with pytest.raises(InputError, match="propagation: expected closed-form or printed, got pca"):
         SynthesisOptions(propagation="pca")
+    with pytest.raises(InputError, match=r"slack: expected a number of 0 or more, got -0\.1"):
+        SynthesisOptions(slack=-0.1)
+    with pytest.raises(InputError, match="distance_penalty: expected finite numbers, got nan"):
+        SynthesisOptions(distance_penalty=np.nan)
     synthesizer = Synthesizer(person[0])
     with pytest.raises(InputError, match="head: expected told or still, got moved"):
         synthesizer.complete(np.array([3]), np.zeros((1, 2)), head="moved")

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import typer
 
 from mien.app.cli_examples import examples
+from mien.app.cli_synthesize import synthesize
 from mien.app.cli_track import track
 from mien.app.options import (
     check_finite,
@@ -257,6 +258,7 @@ def animate(
 
 app.command()(track)
 app.command()(examples)
+app.command()(synthesize)
 
 
 def main(arguments: list[str] | None = None) -> int:

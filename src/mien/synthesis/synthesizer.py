@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from mien.arrays import Array, Float, Int, UInt8, frozen
+from mien.arrays import Array, Float, Int, UInt8, check_array, frozen
 from mien.errors import InputError
 from mien.synthesis.coefficients import coefficients
 from mien.synthesis.compose import Composer
@@ -45,7 +45,7 @@ class SynthesisOptions:
         distance_penalty, slack, together: as for `coefficients`.
         propagation: how all points come from some: "closed-form" is the one that was measured
             better, "printed" the paper's.
-    Raises: InputError: another name of a propagation.
+    Raises: InputError: another name of a propagation, a penalty or slack that is no number from 0.
     """
 
     distance_penalty: float = 0.02
@@ -54,7 +54,11 @@ class SynthesisOptions:
     propagation: PropagationName = "closed-form"
 
     def __post_init__(self) -> None:
-        """Check the name."""
+        """Check what can be checked without examples."""
+        for name in ("distance_penalty", "slack"):
+            value = float(check_array(name, getattr(self, name), ()))
+            if value < 0:
+                raise InputError(name, "a number of 0 or more", value)
         _checked(self.propagation, PropagationName, "propagation")
 
     @classmethod

@@ -1,0 +1,144 @@
+"""What `mien synthesize` is asked to draw: points of a file, or those of a photo's face."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from mien.app.example_marks import read_marks, with_marks
+from mien.arrays import Array, Float, Int
+from mien.capture.photos import load_photo
+from mien.errors import InputError
+from mien.formats.points_file import read_points
+from mien.synthesis.motion import PlanarMotion
+from mien.synthesis.plausible import STRANGER, face_width, head_moved, look_mirrored, oddness
+from mien.synthesis.synthesizer import LEAST_TELLING, Synthesizer
+
+__all__ = ["HeadChoice", "Target", "target_from_photo", "target_from_points"]
+
+HeadChoice = Literal["auto", "still", "moved"]
+
+_FAR = 0.5
+"""Face widths beyond the edge of the picture from which points are of another picture."""
+
+_LARGER = 1.5
+"""A face so much larger than in the neutral photo is visibly soft."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is to be drawn.
+
+    Attributes:
+        points: (n, 2) px of the picture.
+        motion: of the head, from the neutral photo to the picture; None: none.
+        size: width and height of the picture; None: the neutral photo's.
+        notes: what the user should know.
+    """
+
+    points: Float[Array, "n 2"]
+    motion: PlanarMotion | None = None
+    size: tuple[int, int] | None = None
+    notes: tuple[str, ...] = ()
+
+
+def target_from_points(
+    synthesizer: Synthesizer, path: str | Path, *, head: HeadChoice = "auto"
+) -> Target:
+    """All points from those of a file, px of the neutral photo.
+
+    Args:
+        path: as for `read_points`.
+        head: whether it is where the neutral photo has it, or moved: then the points tell how, and
+            the picture moves with it. Of both, "auto" takes what makes the points likelier.
+    Raises: InputError: fewer than three points, points that look mirrored or lie far outside.
+        FileFormatError: as `read_points`. EstimationError: all points in one place.
+    """
+    layout = synthesizer.examples.layout
+    known, positions = read_points(path, layout)
+    if len(known) < LEAST_TELLING:
+        expected = f"at least {LEAST_TELLING} points of {layout.name}"
+        raise InputError(path, expected, ", ".join(layout.names[index] for index in known))
+    _check_sides(synthesizer, path, known, positions)
+    notes = _outside_notes(synthesizer, path, known, positions)
+    moved = head == "moved" or (
+        head == "auto" and head_moved(synthesizer.examples, known, positions)
+    )
+    points = synthesizer.complete(known, positions, head="told" if moved else "still")
+    if not moved:
+        return Target(points, notes=notes)
+    if head == "auto":
+        notes = (
+            *notes,
+            f"{path}: the head moved, and so does the picture (--head still: it did not)",
+        )
+    return Target(points, synthesizer.head_motion(points), notes=notes)
+
+
+def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int | None) -> Target:
+    """The points of a photo's face; marks beside the photo win, as for `mien examples`.
+
+    Args:
+        face: which one, from left to right from 1; None: the largest.
+    Raises: InputError, FileFormatError: no photo, or a damaged one; no such face. EstimationError:
+        no face in it, or one too small.
+    """
+    from mien.capture.detector import LandmarkDetector
+
+    layout = synthesizer.examples.layout
+    photo = load_photo(path)
+    with LandmarkDetector() as detector:
+        landmarks = detector.detect(photo, face=face)
+    detected = layout.from_landmarks(landmarks.points)
+    points = with_marks(layout, detected, read_marks(Path(path), photo, layout))
+    motion = synthesizer.head_motion(points)
+    notes = [*photo.notes, *landmarks.notes, *_stranger_notes(synthesizer, path, points)]
+    if motion.scale > _LARGER:
+        times = f"{float(motion.scale):.1f} times as large as in the examples"
+        notes.append(f"{path}: the face is {times}: the picture is as soft as they are")
+    return Target(points, motion, photo.size, tuple(notes))
+
+
+def _check_sides(
+    synthesizer: Synthesizer, path: str | Path, known: Int[Array, " k"], positions: Array
+) -> None:
+    examples = synthesizer.examples
+    if look_mirrored(examples.layout, examples.neutral.points, known, positions):
+        expected = "right and left as the subject has them"
+        raise InputError(path, expected, "points that fit the face only when mirrored")
+
+
+def _outside_notes(
+    synthesizer: Synthesizer, path: str | Path, known: Int[Array, " k"], positions: Array
+) -> tuple[str, ...]:
+    """That some points lie outside of the picture. Raises: InputError: far outside."""
+    layout, neutral = synthesizer.examples.layout, synthesizer.examples.neutral
+    height, width = neutral.photo.shape[:2]
+    beyond = np.maximum(-positions, positions - [width, height]).max(axis=1)
+    worst = int(beyond.argmax())
+    name = layout.names[known[worst]]
+    if beyond[worst] > _FAR * face_width(layout, neutral.points):
+        expected = f"px of the neutral photo, which is {width}x{height}"
+        place = ", ".join(f"{number:g}" for number in positions[worst])
+        raise InputError(path, expected, f"{name} at {place}")
+    if beyond[worst] <= 0:
+        return ()
+    count = int((beyond > 0).sum())
+    told = f"{count} of {len(known)} points lie outside of the picture, {name} farthest"
+    return (f"{path}: {told}",)
+
+
+def _stranger_notes(
+    synthesizer: Synthesizer, path: str | Path, points: Float[Array, "n 2"]
+) -> list[str]:
+    odd = oddness(synthesizer.examples, points)
+    if odd is None or odd < STRANGER:
+        return []
+    return [
+        f"{path}: the face looks like another person's, or is turned far: its shape is "
+        f"{odd / STRANGER:.1f} times as far as usual from all that was seen of this person; "
+        "its points are taken as they are"
+    ]
