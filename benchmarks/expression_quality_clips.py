@@ -1,0 +1,180 @@
+"""Filmed faces parted into examples and held-out frames, and how near a picture comes to one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mien.arrays import Array, Bool, Float, Int, UInt8
+from mien.assets.feature_points import FeatureLayout
+from mien.assets.subregions import default_subregions
+from mien.capture.detector import LandmarkDetector
+from mien.capture.mediapipe_face import yaw_pitch
+from mien.capture.sharpness import face_sharpness
+from mien.capture.video import Video
+from mien.synthesis.choose import ExampleCandidates, choose_examples
+from mien.synthesis.examples import Example, ExampleSet
+from mien.synthesis.motion import compensated
+
+__all__ = ["FilmedFace", "Likeness", "examples_of", "face_mask", "filmed", "held_out", "likeness"]
+
+BLOCK = 15
+"""Frames that stay together, so that no held-out frame has its neighbour among the examples."""
+TEETH_SHOW = 0.03
+"""Gap of the lips, in widths of the face, from which on teeth can be seen between them."""
+_MESH_LANDMARKS = 468
+
+
+@dataclass(frozen=True)
+class FilmedFace:
+    """The frames of a clip in which a face was found.
+
+    Attributes:
+        frames: (h, w, 3) each. index: (N,) their numbers in the clip.
+        landmarks: (N, 478, 2) px. points: (N, n, 2) px of the layout.
+        pose: (N, 2) yaw and pitch, radians. sharpness: (N,).
+    """
+
+    layout: FeatureLayout
+    frames: tuple[UInt8[Array, "h w 3"], ...]
+    index: Int[Array, " N"]
+    landmarks: Float[Array, "N 478 2"]
+    points: Float[Array, "N n 2"]
+    pose: Float[Array, "N 2"]
+    sharpness: Float[Array, " N"]
+
+    @property
+    def lip_gaps(self) -> Float[Array, " N"]:
+        """How far the lips are apart, in widths of the face."""
+        upper, lower = (self.layout.index(f"{lip}_lip_inner") for lip in ("upper", "lower"))
+        apart = np.linalg.norm(self.points[:, upper] - self.points[:, lower], axis=1)
+        gaps: Array = apart / np.ptp(self.points[..., 0], axis=1)
+        return gaps
+
+
+def filmed(clip: Path, layout: FeatureLayout, detector: LandmarkDetector) -> FilmedFace:
+    """A clip as the detector sees it."""
+    frames, index, faces = [], [], []
+    for frame in Video(clip).frames():
+        pixels = frame.pixels()
+        face = detector.detect_fast(pixels)
+        if face is not None:
+            frames.append(pixels)
+            index.append(frame.index)
+            faces.append(face)
+    landmarks = np.array([face.points[:, :2] for face in faces])
+    sharpness = [face_sharpness(f, p) for f, p in zip(frames, landmarks, strict=True)]
+    return FilmedFace(
+        layout=layout,
+        frames=tuple(frames),
+        index=np.array(index),
+        landmarks=landmarks,
+        points=layout.mixes @ landmarks,
+        pose=np.array([yaw_pitch(face.R_cam_head) for face in faces]),
+        sharpness=np.array(sharpness),
+    )
+
+
+def examples_of(face: FilmedFace, count: int, *, odd: bool = True) -> ExampleSet:
+    """Examples from the odd blocks, or from the even ones, chosen as mien chooses them."""
+    rows = np.flatnonzero((face.index // BLOCK % 2 == 1) == odd)
+    points, gaps = face.points[rows], face.lip_gaps[rows]
+    neutral = _at_rest(points, gaps)
+    geometries, _ = compensated(points, points[neutral])
+    shapes = default_subregions(face.layout, points[neutral], (1, 1))
+    regions = list(zip(shapes.names, shapes.members, strict=True))
+    candidates = ExampleCandidates(geometries, face.sharpness[rows], face.pose[rows])
+    chosen = choose_examples(candidates, regions, neutral, count=count).rows
+    standard = int(gaps[chosen].argmax())
+    height, width = face.frames[0].shape[:2]
+    return ExampleSet(
+        layout=face.layout,
+        examples=tuple(_example(face, int(row)) for row in rows[chosen]),
+        standard=standard,
+        statistics=geometries,
+        subregions=default_subregions(face.layout, points[chosen[standard]], (width, height)),
+        teeth=tuple(np.flatnonzero(gaps[chosen] >= TEETH_SHOW).tolist()),
+    )
+
+
+def held_out(face: FilmedFace, count: int, *, odd: bool = True, skip: int = 0) -> list[int]:
+    """So many rows at even distances of the blocks that no example is from.
+
+    Args:
+        skip: 0 to 1, how far between two of them each begins.
+    """
+    rows = np.flatnonzero((face.index // BLOCK % 2 == 1) != odd)
+    places = (np.arange(count) + 0.5 * skip) * len(rows) / count
+    return [int(row) for row in rows[np.unique(places.astype(int))]]
+
+
+def face_mask(face: FilmedFace, row: int) -> Bool[Array, "h w"]:
+    """Pixels within the convex hull of a frame's landmarks."""
+    import cv2
+
+    mask = np.zeros(face.frames[row].shape[:2], np.uint8)
+    hull = cv2.convexHull(face.landmarks[row, :_MESH_LANDMARKS].astype(np.float32))
+    filled = cv2.fillConvexPoly(mask, hull.astype(np.int32), 1)
+    return np.asarray(filled) > 0
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """How near a picture comes to the true one, over a mask.
+
+    Attributes:
+        psnr: dB. ssim: of brightness, windows of 11 px.
+        detail: deviation of what is finer than 2 px, in shares of the true picture's: 1 is as
+            sharp, less is blurred.
+    """
+
+    psnr: float
+    ssim: float
+    detail: float
+
+
+def likeness(
+    picture: UInt8[Array, "h w 3"], truth: UInt8[Array, "h w 3"], mask: Bool[Array, "h w"]
+) -> Likeness:
+    """PSNR, SSIM (Wang et al. 2004) and how much fine detail there is."""
+    squared = (picture[mask].astype(float) - truth[mask]) ** 2
+    pair = [_grey(image) for image in (picture, truth)]
+    means = [_blurred(image) for image in pair]
+    variances = [_blurred(g * g) - m * m for g, m in zip(pair, means, strict=True)]
+    shared = _blurred(pair[0] * pair[1]) - means[0] * means[1]
+    bright, contrast = (0.01 * 255) ** 2, (0.03 * 255) ** 2
+    above = (2 * means[0] * means[1] + bright) * (2 * shared + contrast)
+    below = (means[0] ** 2 + means[1] ** 2 + bright) * (sum(variances) + contrast)
+    fine = [float((image - mean)[mask].std()) for image, mean in zip(pair, means, strict=True)]
+    return Likeness(
+        psnr=float(10 * np.log10(255**2 / max(squared.mean(), 1e-9))),
+        ssim=float((above / below)[mask].mean()),
+        detail=fine[0] / fine[1],
+    )
+
+
+def _grey(image: UInt8[Array, "h w 3"]) -> Float[Array, "h w"]:
+    import cv2
+
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), float)
+
+
+def _blurred(image: Float[Array, "h w"]) -> Float[Array, "h w"]:
+    import cv2
+
+    return np.asarray(cv2.GaussianBlur(image, (11, 11), 1.5))
+
+
+def _at_rest(points: Float[Array, "N n 2"], gaps: Float[Array, " N"]) -> int:
+    """The frame that is nearest to the median one and whose mouth is not open."""
+    geometries, _ = compensated(points, points[0])
+    width = float(np.ptp(np.median(geometries, axis=0)[:, 0]))
+    apart = np.linalg.norm(geometries - np.median(geometries, axis=0), axis=(1, 2)) / width
+    return int((apart + 3 * gaps).argmin())
+
+
+def _example(face: FilmedFace, row: int) -> Example:
+    number = int(face.index[row])
+    return Example(f"{number:06d}", face.frames[row], face.points[row], f"frame {number}")
