@@ -1,0 +1,129 @@
+"""Pictures of a sequence follow its geometry: no step of theirs is larger than that asks for.
+
+Each picture is made on its own (Z06 section 14.1). A picture that jumped somewhere would differ
+from the one before by the same amount however short the time between them; one that follows
+differs by half when the steps of the geometry are half as long.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from mien.assets.feature_points import load_feature_layout
+from mien.assets.subregions import default_subregions
+from mien.synthesis.coefficients import coefficients
+from mien.synthesis.examples import Example, ExampleSet
+from mien.synthesis.synthesizer import SynthesisOptions, Synthesizer
+
+LAYOUT = load_feature_layout()
+STEPS = 8
+OPTIONS = {"usual": SynthesisOptions(), "paper": SynthesisOptions.paper()}
+
+
+def painted(size, number):
+    """A pattern that all examples have and, as strong, wrinkles that no other one has."""
+    width, height = size
+    y, x = np.mgrid[:height, :width] + 0.5
+    turns = [0.7 * number + channel for channel in range(3)]
+    own = [np.sin((np.cos(turn) * x + np.sin(turn) * y) / 5) for turn in turns]
+    common = np.sin(x / 5) * np.cos(y / 7)
+    return np.uint8(127.5 + 60 * np.stack(own, axis=-1) + 60 * common[..., None])
+
+
+@pytest.fixture(scope="module")
+def person():
+    """Ten examples whose points and textures have little to do with each other; key geometries."""
+    rng = np.random.default_rng(7)
+    size = (200, 250)
+    neutral = (LAYOUT.template - LAYOUT.template.mean(0)) * 130 + [100, 125]
+    x, y = LAYOUT.template.T
+    wave, phase = rng.normal(0, 6, (2, 8, 2)), rng.uniform(0, 6, (2, 8))
+    ways = np.sin(wave[..., :1] * x + wave[..., 1:] * y + phase[..., None])
+    seen = neutral + np.einsum("awn,mw->mna", ways, rng.normal(0, 2.0, (14, 8)))
+    pairs = enumerate([neutral, *seen[:9]])
+    examples = tuple(Example(f"e{i}", painted(size, i), points, "") for i, points in pairs)
+    subregions = default_subregions(LAYOUT, seen[0], size)
+    return ExampleSet(LAYOUT, examples, 1, seen, subregions), [neutral, *seen[9:], neutral]
+
+
+@pytest.fixture(scope="module")
+def filmed(shared: Path):
+    """Sixteen frames of a clip as examples, spread over it; others as key geometries."""
+    from mien.capture.detector import LandmarkDetector
+    from mien.capture.video import Video
+
+    clip = Video(shared / "data" / "videos" / "driving_d10.mp4")
+    frames = [frame.pixels() for i, frame in enumerate(clip.frames()) if i % 14 == 0]
+    with LandmarkDetector() as detector:
+        faces = [detector.detect_fast(frame) for frame in frames]
+    points = [LAYOUT.from_landmarks(face.points[:, :2]) for face in faces]
+    examples = tuple(Example(f"f{i}", frames[i], points[i], "") for i in range(0, len(frames), 2))
+    height, width = frames[0].shape[:2]
+    subregions = default_subregions(LAYOUT, points[0], (width, height))
+    found = ExampleSet(LAYOUT, examples, 0, np.stack(points), subregions)
+    found = replace(found, statistics=found.geometry(found.statistics))
+    return found, [found.statistics[i] for i in (1, 9, 15, 23, 29)]
+
+
+def path_of(keys, steps):
+    """Points on the way between key geometries, in steps alike between two of them."""
+    shares = np.arange(steps) / steps
+    parts = [a + (b - a) * shares[:, None, None] for a, b in pairwise(keys)]
+    return np.concatenate([*parts, [keys[-1]]])
+
+
+def picture_steps(example_set, keys, steps, options):
+    """Between pictures: mean difference over the face, grey levels per px that points moved."""
+    synthesizer = Synthesizer(example_set, options)
+    shape = example_set.neutral.photo.shape[:2]
+    face = np.zeros(shape, np.uint8)
+    hull = cv2.convexHull(example_set.neutral.points.astype(np.float32)).astype(np.int32)
+    cv2.fillConvexPoly(face, hull, 1)
+    points = path_of(keys, steps)
+    pictures = [synthesizer.synthesize(place).image[face > 0].astype(np.int16) for place in points]
+    moved = np.linalg.norm(np.diff(points, axis=0), axis=2).mean(axis=1)
+    differences = np.array([np.abs(b - a).mean() for a, b in pairwise(pictures)])
+    return differences, differences / moved
+
+
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+@pytest.mark.parametrize(("who", "most"), [("person", 4), ("filmed", 2)])
+def test_a_sequence_steps_no_farther_than_its_geometry(who, most, options, request):
+    """Measured: 3 times the median step where wrinkles are made up, 1.3 on the clip."""
+    example_set, keys = request.getfixturevalue(who)
+    steps, per_px = picture_steps(example_set, keys, STEPS, options)
+    finer, finer_per_px = picture_steps(example_set, keys, 2 * STEPS, options)
+    assert finer.max() < 0.75 * steps.max()
+    assert per_px.max() < most * np.median(per_px)
+    assert finer_per_px.max() < most * np.median(finer_per_px)
+
+
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+def test_shares_do_not_jump(person, options):
+    """Where they change fastest, nearer and nearer places have nearer and nearer shares."""
+    example_set, keys = person
+
+    def shares(place):
+        return coefficients(example_set, place, distance_penalty=options.distance_penalty)
+
+    places = path_of(keys, STEPS)
+    found = [shares(place) for place in places]
+    steps = [np.abs(b - a).sum(axis=1).max() for a, b in pairwise(found)]
+    first = int(np.argmax(steps))
+    near, far = places[first], places[first + 1]
+    apart = []
+    for _ in range(10):
+        middle = (near + far) / 2
+        before, after = (
+            np.abs(shares(a) - shares(b)).sum(axis=1).max()
+            for a, b in ((near, middle), (middle, far))
+        )
+        apart.append(max(before, after))
+        near, far = (near, middle) if before > after else (middle, far)
+    assert apart[-1] < 0.02 * max(steps)
