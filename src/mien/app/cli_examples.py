@@ -49,6 +49,9 @@ def examples(
     max_side: Annotated[
         int, typer.Option(min=128, max=4096, help="px; larger photos are reduced to it.")
     ] = 1200,
+    even: Annotated[
+        bool, typer.Option(help="Bring all photos to the exposure of the face at rest.")
+    ] = True,
     json_: Json = False,
 ) -> None:
     """Photos or a video to a set of examples that expressions are mixed from."""
@@ -62,6 +65,7 @@ def examples(
         exclude=tuple(exclude or ()),
         face=face,
         max_side=max_side,
+        even=even,
     )
     with terminal_progress(json_, counted=COUNTED) as progress:
         gathered = write_example_folder(source, output, request=request, progress=progress)

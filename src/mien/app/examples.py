@@ -24,8 +24,10 @@ from mien.formats.example_folder import (
 )
 from mien.formats.image import encode_image
 from mien.report.example_sheet import example_sheet
+from mien.synthesis.covered import LipColours
 from mien.synthesis.examples import ExampleSet
 from mien.synthesis.gather import COUNT, ExamplePlan, Wishes, build_examples, plan_examples
+from mien.synthesis.unfit import COVERED, CUT, unfit_reasons
 
 if TYPE_CHECKING:
     from mien.build import Progress
@@ -47,6 +49,7 @@ class ExampleRequest:
         include, exclude: pictures that are, and are not, to be examples.
         face: which one, from left to right, in photos of several people.
         max_side: px; larger pictures are reduced to it.
+        even: bring photos to one exposure.
     """
 
     count: int = COUNT
@@ -56,6 +59,7 @@ class ExampleRequest:
     exclude: tuple[str, ...] = ()
     face: int | None = None
     max_side: int = MAX_SIDE
+    even: bool = True
 
     def wishes(self, series: FaceSeries) -> Wishes:
         """The same by the rows of a series. Raises: InputError: names what is not there."""
@@ -126,25 +130,34 @@ def gather_examples(
     """
     request, layout = request or ExampleRequest(), layout or load_feature_layout()
     tell = progress or (lambda stage, done, total: None)
+    lips = LipColours(layout)
     with LandmarkDetector() as detector:
         series = find_faces(
             source,
             detector,
             max_side=request.max_side,
             face=request.face,
+            look=lips,
             report=partial(tell, FINDING),
         )
     wishes = request.wishes(series)
     marks = _marks(series, layout)
     points = points_of(series, layout, marks)
-    plan = plan_examples(layout, series, points, wishes=wishes, count=request.count)
+    unfit = unfit_reasons(points, series.sizes, lips.covered(series.seconds))
+    plan = plan_examples(layout, series, points, wishes=wishes, unfit=unfit, count=request.count)
     rows = plan.choice.rows.tolist()
     photos = dict(load_pictures(series, rows, partial(tell, FETCHING)))
     video = series.source.name if series.is_video else ""
-    examples, why = build_examples(plan, photos, source=video)
+    examples, why = build_examples(plan, photos, source=video, even=request.even)
     pictures = dict(zip(plan.names, plan.choice.reasons, strict=True)) | series.left_out
-    notes = (*series.notes, *_notes(plan, series, marks))
-    return GatheredExamples(examples, why, tuple(sorted(pictures.items())), notes)
+    changed = [
+        example.photo is not photos[row].pixels
+        for example, row in zip(examples.examples, rows, strict=True)
+    ]
+    notes = [*series.notes, *_notes(plan, series, marks)]
+    if any(changed):
+        notes.append(f"{sum(changed)} examples brought to the exposure of the one at rest")
+    return GatheredExamples(examples, why, tuple(sorted(pictures.items())), tuple(notes))
 
 
 def _marks(series: FaceSeries, layout: FeatureLayout) -> dict[int, dict]:
@@ -162,27 +175,29 @@ def _notes(plan: ExamplePlan, series: FaceSeries, marks: dict[int, dict]) -> lis
         f"{series.names[row]}: {len(found)} points marked by hand" for row, found in marks.items()
     ]
     counts = Counter(_kind(reason) for reason in plan.choice.reasons)
-    counts["without a usable face"] = len(series.left_out)
-    told = [f"{counts[kind]} {kind}" for kind in KINDS if counts[kind]]
+    counts[NO_FACE] = len(series.left_out)
+    kinds = ("chosen", *KINDS.values(), NO_FACE)
+    told = [f"{counts[kind]} {kind}" for kind in kinds if counts[kind]]
     notes.append(f"of {len(series) + len(series.left_out)} pictures {', '.join(told)}")
     return notes
 
 
-KINDS = (
-    "chosen",
-    "like chosen ones",
-    "blurred",
-    "turned away",
-    "excluded",
-    "without a usable face",
-)
+NO_FACE = "without a usable face"
+KINDS = {
+    "like ": "like chosen ones",
+    "different": "different, but beyond the count",
+    "blurred": "blurred",
+    "turned away": "turned away",
+    CUT: "cut by the picture's edge",
+    COVERED: "with something before the mouth",
+    "small": "small",
+    "excluded": "excluded",
+}
+"""What pictures that are not chosen are called, by how their reasons begin."""
 
 
 def _kind(reason: str) -> str:
-    for start, kind in (("like ", KINDS[1]), ("blurred", KINDS[2]), ("turned away", KINDS[3])):
-        if reason.startswith(start):
-            return kind
-    return "excluded" if reason == "excluded" else "chosen"
+    return next((kind for start, kind in KINDS.items() if reason.startswith(start)), "chosen")
 
 
 def _choice_csv(pictures: Sequence[tuple[str, str]]) -> str:

@@ -42,6 +42,7 @@ class FaceSeries:
         landmarks: (N, 478, 2) px of the picture as `load_pictures` gives it.
         sizes: (N, 2) their widths and heights, px.
         scores: of the same; `index` counts frames or photos from 0.
+        seconds: of a video's frames, since its beginning.
         max_side: px; larger pictures are reduced to it.
         left_out: why, by name, of the pictures in which no face can be used.
         notes: what was odd.
@@ -54,6 +55,7 @@ class FaceSeries:
     landmarks: Float[Array, "n 478 2"]
     sizes: Int[Array, "n 2"]
     scores: FrameScores
+    seconds: Float[Array, " n"] | None
     max_side: int
     left_out: dict[str, str]
     notes: tuple[str, ...]
@@ -121,6 +123,7 @@ class _Gathered:
         self.names: list[str] = []
         self.landmarks: list[Array] = []
         self.sizes: list[tuple[int, int]] = []
+        self.seconds: list[float] = []
         self.rows: list[tuple[int, float, DetectedFace]] = []
         self.left_out: dict[str, str] = {}
         self.notes: list[str] = []
@@ -136,6 +139,7 @@ class _Gathered:
                 if found is None:
                     self.left_out[frame_name(picture.frame)] = "no face found"
                 else:
+                    self.seconds.append(picture.seconds)
                     self._add(frame_name(picture.frame), picture.frame, picture.pixels, found)
                 if report is not None:
                     report(picture.frame + 1, max(total, picture.frame + 1))
@@ -197,6 +201,7 @@ class _Gathered:
             np.stack(self.landmarks),
             np.array(self.sizes),
             FrameScores.of(*zip(*self.rows, strict=True)),
+            np.array(self.seconds) if self.is_video else None,
             self.max_side,
             self.left_out,
             tuple(self.notes),

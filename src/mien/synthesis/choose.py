@@ -58,11 +58,9 @@ class ExampleCandidates:
         share = self.sharpness / np.median(self.sharpness)
         known = self.unfit or ("",) * len(self.geometries)
         return [
-            f"turned away by {np.degrees(turn):.0f} degrees"
-            if turn > max_turn
-            else f"blurred, {sharp:.0%} of the usual sharpness"
-            if sharp < _LEAST_SHARPNESS
-            else reason
+            reason
+            or (f"turned away by {np.degrees(turn):.0f} degrees" if turn > max_turn else "")
+            or (f"blurred, {sharp:.0%} of the usual sharpness" * bool(sharp < _LEAST_SHARPNESS))
             for turn, sharp, reason in zip(turned, share, known, strict=True)
         ]
 
@@ -176,7 +174,13 @@ def _farthest(
         reasons[row] = f"chosen as number {len(chosen)}, for the {distances.largest(row, other)}"
         take(row)
     for left in np.flatnonzero(usable).tolist():
-        reasons[left] = f"like {candidates.name(int(owner[left]))}"
+        other = int(owner[left])
+        kind = (
+            "different, but beyond the count; nearest is"
+            if distances.differ(left, other)
+            else "like"
+        )
+        reasons[left] = f"{kind} {candidates.name(other)}"
     return chosen
 
 
