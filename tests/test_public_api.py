@@ -66,7 +66,13 @@ def test_importing_mien_loads_nothing_heavy() -> None:
 
 @pytest.mark.parametrize(
     "arguments",
-    [["--help"], *([name, "--help"] for name in ("build", "render", "animate", "track"))],
+    [
+        ["--help"],
+        *(
+            [name, "--help"]
+            for name in ("build", "render", "animate", "track", "examples", "synthesize")
+        ),
+    ],
 )
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
     assert heavy_modules_after(f"from mien.app.cli import main\nmain({arguments})") == []

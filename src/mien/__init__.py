@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mien.animate.timeline import Timeline
     from mien.app.animate import Take, animate_head
+    from mien.app.examples import gather_examples
+    from mien.app.synthesize import synthesize_expression
     from mien.app.track import Tracked, track_video
     from mien.app.track_files import TrackFiles
     from mien.assets.generic import load_generic_head
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from mien.errors import EstimationError, FileFormatError, InputError, MienError
     from mien.expressions.rig import Rig
     from mien.expressions.state import FaceState, Gaze
+    from mien.formats.example_folder import load_examples, write_examples
     from mien.formats.export import export_head
     from mien.formats.head_folder import load_head, save_head
     from mien.formats.timeline_file import load_performance
@@ -28,6 +31,8 @@ if TYPE_CHECKING:
     from mien.model.fit import FitOptions
     from mien.model.head import Head
     from mien.render.picture import HeadRenderer, render_head
+    from mien.synthesis.examples import Example, ExampleSet
+    from mien.synthesis.synthesizer import Synthesis, SynthesisOptions, Synthesizer
     from mien.track.state import Track, TrackedFrame, TrackState
     from mien.track.tracker import Tracker, TrackOptions
 
@@ -38,6 +43,8 @@ __all__ = [
     "BuildOptions",
     "Camera",
     "EstimationError",
+    "Example",
+    "ExampleSet",
     "FaceState",
     "FileFormatError",
     "FitOptions",
@@ -49,6 +56,9 @@ __all__ = [
     "Mesh",
     "MienError",
     "Rig",
+    "Synthesis",
+    "SynthesisOptions",
+    "Synthesizer",
     "Take",
     "Timeline",
     "Track",
@@ -61,13 +71,17 @@ __all__ = [
     "animate_head",
     "build_head",
     "export_head",
+    "gather_examples",
+    "load_examples",
     "load_generic_head",
     "load_head",
     "load_performance",
     "load_track",
     "render_head",
     "save_head",
+    "synthesize_expression",
     "track_video",
+    "write_examples",
     "write_track",
 ]
 
@@ -76,6 +90,8 @@ _HOMES = {
     "BuildOptions": "build",
     "Camera": "camera",
     "EstimationError": "errors",
+    "Example": "synthesis.examples",
+    "ExampleSet": "synthesis.examples",
     "FaceState": "expressions.state",
     "FileFormatError": "errors",
     "FitOptions": "model.fit",
@@ -87,6 +103,9 @@ _HOMES = {
     "Mesh": "mesh",
     "MienError": "errors",
     "Rig": "expressions.rig",
+    "Synthesis": "synthesis.synthesizer",
+    "SynthesisOptions": "synthesis.synthesizer",
+    "Synthesizer": "synthesis.synthesizer",
     "Take": "app.animate",
     "Timeline": "animate.timeline",
     "Track": "track.state",
@@ -99,13 +118,17 @@ _HOMES = {
     "animate_head": "app.animate",
     "build_head": "build",
     "export_head": "formats.export",
+    "gather_examples": "app.examples",
+    "load_examples": "formats.example_folder",
     "load_generic_head": "assets.generic",
     "load_head": "formats.head_folder",
     "load_performance": "formats.timeline_file",
     "load_track": "formats.track_csv",
     "render_head": "render.picture",
     "save_head": "formats.head_folder",
+    "synthesize_expression": "app.synthesize",
     "track_video": "app.track",
+    "write_examples": "formats.example_folder",
     "write_track": "formats.track_csv",
 }
 
