@@ -114,6 +114,11 @@ def test_a_negative_penalty(example_set):
         coefficients(example_set, example_set.neutral.points, distance_penalty=-1.0)
 
 
+def test_a_negative_slack(example_set):
+    with pytest.raises(InputError, match="slack"):
+        coefficients(example_set, example_set.neutral.points, slack=-1.0)
+
+
 def test_subregions_together_have_the_same_shares(example_set):
     points = np.array(example_set.neutral.points)
     half = example_set.subregions.members[0]

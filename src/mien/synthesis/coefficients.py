@@ -9,7 +9,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array
 from mien.errors import InputError
-from mien.numeric.simplex import simplex_least_squares
+from mien.numeric.simplex import nearest_mixture
 from mien.synthesis.examples import ExampleSet
 
 __all__ = ["UPPER_FACE", "coefficients", "coefficients_of", "distances_of", "hull_distances"]
@@ -89,10 +89,18 @@ def coefficients_of(
     """
     if not 0 <= distance_penalty < np.inf:
         raise InputError("distance_penalty", "a number of at least 0", distance_penalty)
+    if not 0 <= slack < np.inf:
+        raise InputError("slack", "a number of at least 0", slack)
     shares = np.empty((len(subregions.names), len(apart)))
     for rows in _groups(subregions.names, together):
-        members = np.unique(np.concatenate([subregions.members[row] for row in rows]))
-        shares[rows] = _shares(_columns(apart, members), distance_penalty, slack)
+        # Most groups are one subregion, and looking for what is double takes time.
+        members = subregions.members[rows[0]]
+        if len(rows) > 1:
+            members = np.unique(np.concatenate([subregions.members[row] for row in rows]))
+        offsets = apart[:, members].reshape(len(apart), -1)
+        products = offsets @ offsets.T
+        penalty = distance_penalty * products.diagonal()
+        shares[rows] = nearest_mixture(products, slack=slack, penalty=penalty)
     return shares
 
 
@@ -108,18 +116,6 @@ def distances_of(
     parts = zip(shares, subregions.members, strict=True)
     missed = [np.tensordot(row, apart[:, members], axes=1) for row, members in parts]
     return np.array([np.sqrt((rest**2).sum(axis=1).mean()) for rest in missed])
-
-
-def _shares(
-    offsets: Float[Array, "d m"], distance_penalty: float, slack: float
-) -> Float[Array, " m"]:
-    """The mix of examples, told relative to the target, that is nearest to it."""
-    squares = (offsets**2).sum(axis=0)
-    size = float(squares.mean()) or 1.0
-    penalty = distance_penalty * squares / size
-    target = np.zeros(len(offsets))
-    scaled = offsets / np.sqrt(size)
-    return simplex_least_squares(scaled, target, slack=slack, penalty=penalty)
 
 
 def _groups(names: Sequence[str], together: Sequence[Collection[str]]) -> list[list[int]]:
@@ -154,9 +150,3 @@ def _apart(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Float[Array,
     points = check_array("points", points, (len(example_set.layout.names), 2))
     apart: Array = example_set.geometries - example_set.geometry(points)
     return apart
-
-
-def _columns(apart: Float[Array, "m n d"], members: Int[Array, " k"]) -> Float[Array, "d m"]:
-    """Of some points, one column an example."""
-    columns: Array = apart[:, members].reshape(len(apart), -1).T
-    return columns
