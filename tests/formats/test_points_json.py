@@ -120,3 +120,14 @@ def test_files_of_other_kinds(tmp_path: Path, layout: FeatureLayout) -> None:
     (tmp_path / "a.tem").write_text("2\n1 2\n3 4\n")
     with pytest.raises(FileFormatError, match=r"expected 134 points \(zhang134\), 83 "):
         read_points(tmp_path / "a.tem", layout)
+
+
+def test_points_in_space(tmp_path: Path, layout: FeatureLayout) -> None:
+    path = tmp_path / "P.json"
+    write_points_json(path, layout, {"menton": np.array([1.0, -120.5, 20.25])})
+    found = read_points_json(path, layout, axes=3)
+    assert found["menton"].tolist() == [1, -120.5, 20.25]
+    with pytest.raises(FileFormatError, match=r"points\.menton: expected x and y, found 3 numbers"):
+        read_points_json(path, layout)
+    with pytest.raises(InputError, match="two numbers for each, or three"):
+        write_points_json(path, layout, {"menton": np.zeros(3), "nose_tip": np.zeros(2)})

@@ -11,18 +11,21 @@ from mien.app.printing import Json, print_result
 from mien.app.progress import terminal_progress
 
 if TYPE_CHECKING:
+    from mien.app.synthesize_head import HeadView
     from mien.synthesis.synthesizer import SynthesisOptions
 
 
 def synthesize(
     examples: Annotated[
-        Path, typer.Argument(help="A folder of examples that `mien examples` made.")
+        Path,
+        typer.Argument(help="What `mien examples` made, or a head folder that `mien build` made."),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="OUT.png or .jpg.")],
     points: Annotated[
         Path | None,
         typer.Option(
-            help="P.json, .tem or .pts: three or more feature points, px of the neutral example."
+            help="P.json, .tem or .pts: three or more feature points, px of the neutral example. "
+            "Of a head, P.json: one or more, [x, y, z] in mm of its own space."
         ),
     ] = None,
     photo: Annotated[
@@ -61,12 +64,32 @@ def synthesize(
         float | None,
         typer.Option(help="How far shares may fall below 0; 0 by default and in Z06."),
     ] = None,
+    yaw: Annotated[
+        float | None, typer.Option(help="Of a head: degrees; it turns to its own left.")
+    ] = None,
+    pitch: Annotated[float | None, typer.Option(help="Of a head: degrees; it tips down.")] = None,
+    size: Annotated[
+        str | None, typer.Option(help="Of a head: WIDTHxHEIGHT in px, 800x1000 by default.")
+    ] = None,
+    background: Annotated[
+        str | None,
+        typer.Option(
+            metavar="COLOUR", help="Of a head: as #204060; transparent by default in a .png."
+        ),
+    ] = None,
     json_: Json = False,
 ) -> None:
     """The picture of an expression, from a few feature points or the face of a photo."""
     from mien.app.synthesize import synthesize_expression
+    from mien.formats.head_folder import is_head_folder
 
     options = _options(paper, propagation, distance_penalty, slack)
+    view = {"--yaw": yaw, "--pitch": pitch, "--size": size, "--background": background}
+    if is_head_folder(examples):
+        _refuse({"--head": None if head == "auto" else head, "--face": face}, "a set of examples")
+        _of_head(examples, output, points, photo, weights, options, not paper, view, json_)
+        return
+    _refuse(view, "a head folder")
     with terminal_progress(json_) as progress:
         made = synthesize_expression(
             examples,
@@ -89,6 +112,71 @@ def synthesize(
         "notes": list(made.notes),
     }
     print_result(json_, data, f"{output}: {width}x{height}", made.notes)
+
+
+def _of_head(
+    folder: Path,
+    output: Path,
+    points: Path | None,
+    photo: Path | None,
+    weights: Path | None,
+    options: SynthesisOptions,
+    reach: bool,
+    view: dict[str, Any],
+    json_: bool,
+) -> None:
+    """The same of a head folder."""
+    from mien.app.synthesize_head import synthesize_head
+
+    if photo is not None:
+        _refuse(view, "--points; a photo has its own")
+    with terminal_progress(json_) as progress:
+        made = synthesize_head(
+            folder,
+            output,
+            points=points,
+            photo=photo,
+            weights=weights,
+            options=options,
+            reach=reach,
+            view=_view(**{name.removeprefix("--"): value for name, value in view.items()}),
+            progress=progress,
+        )
+    width, height = made.size
+    data = {
+        "output": str(output),
+        "width": width,
+        "height": height,
+        "weights": None if weights is None else str(weights),
+        "hull_mm": {name: round(mm, 3) for name, mm in made.hull_mm.items()},
+        "notes": list(made.notes),
+    }
+    print_result(json_, data, f"{output}: {width}x{height}", made.notes)
+
+
+def _view(
+    yaw: float | None, pitch: float | None, size: str | None, background: str | None
+) -> HeadView:
+    from math import radians
+
+    from mien.app.options import check_finite, parse_colour, parse_size
+    from mien.app.synthesize_head import HeadView
+
+    return HeadView(
+        yaw=radians(check_finite("--yaw", yaw or 0.0)),
+        pitch=radians(check_finite("--pitch", pitch or 0.0)),
+        size=parse_size("--size", size or "800x1000"),
+        background=None if background is None else parse_colour("--background", background),
+    )
+
+
+def _refuse(options: dict[str, Any], where: str) -> None:
+    """Raises: InputError: one that was given and means nothing here."""
+    from mien.errors import InputError
+
+    for name, value in options.items():
+        if value is not None:
+            raise InputError(name, f"this only with {where}", value)
 
 
 def _options(

@@ -29,30 +29,39 @@ __all__ = ["read_points_json", "write_points_json"]
 _KEYS = ("layout", "points")
 
 
-def read_points_json(path: str | Path, layout: FeatureLayout) -> dict[str, Float[Array, " 2"]]:
+def read_points_json(
+    path: str | Path, layout: FeatureLayout, *, axes: int = 2
+) -> dict[str, Float[Array, " d"]]:
     """The points in a file, by name, px: `{"layout": "zhang134", "points": {"NAME": [X, Y]}}`.
 
+    Args:
+        axes: 3 for points of a head: [X, Y, Z] mm, head space.
     Raises: InputError: the file cannot be read. FileFormatError: not JSON, another layout's
-        points, an unknown name (suggests the nearest), anything but two finite numbers a point, no
-        point at all; says where.
+        points, an unknown name (suggests the nearest), anything but so many finite numbers a
+        point, no point at all; says where.
     """
     try:
-        return _points(as_object(read_json(path), "", _KEYS), layout)
+        return _points(as_object(read_json(path), "", _KEYS), layout, axes)
     except Broken as broken:
         raise FileFormatError(path, broken.problem, broken.place) from None
 
 
 def write_points_json(
-    path: str | Path, layout: FeatureLayout, points: Mapping[str, Float[Array, " 2"]]
+    path: str | Path, layout: FeatureLayout, points: Mapping[str, Float[Array, " d"]]
 ) -> None:
-    """Writes some or all points of a layout, to a thousandth of a pixel.
+    """Writes some or all points of a layout, to a thousandth of a pixel or of a mm.
 
+    Args:
+        points: by name, two numbers each, or three each.
     Raises: InputError: a name that the layout does not have, shapes, NaN, the place.
     """
     rows = {}
     for name, point in points.items():
         layout.index(name)
-        rows[name] = [round(float(number), 3) for number in check_array(name, point, (2,))]
+        axes = 3 if np.size(point) == 3 else 2
+        rows[name] = [round(float(number), 3) for number in check_array(name, point, (axes,))]
+    if len({len(row) for row in rows.values()}) > 1:
+        raise InputError("points", "two numbers for each, or three", "some of both")
     if not rows:
         raise InputError("points", "at least one", "none")
     lines = ",\n".join(f"    {json.dumps(name)}: {json.dumps(row)}" for name, row in rows.items())
@@ -61,21 +70,24 @@ def write_points_json(
         temporary.write_text(text, encoding="utf-8")
 
 
-def _points(data: Mapping[str, object], layout: FeatureLayout) -> dict[str, Float[Array, " 2"]]:
+def _points(
+    data: Mapping[str, object], layout: FeatureLayout, axes: int
+) -> dict[str, Float[Array, " d"]]:
     name = as_text(need(data, "layout", ""), "layout")
     if name != layout.name:
         raise Broken("layout", f"expected {layout.name!r}, found {name[:40]!r}")
     rows = as_object(need(data, "points", ""), "points")
     if not rows:
         raise Broken("points", "expected at least one point, found none")
-    return {name: _place(name, row, layout) for name, row in rows.items()}
+    return {name: _place(name, row, layout, axes) for name, row in rows.items()}
 
 
-def _place(name: str, row: object, layout: FeatureLayout) -> Float[Array, " 2"]:
+def _place(name: str, row: object, layout: FeatureLayout, axes: int) -> Float[Array, " d"]:
     place = join("points", name)
     if name not in layout.names:
         raise Broken(place, unknown("point", name, layout.names))
     numbers = as_list(row, place)
-    if len(numbers) != 2:
-        raise Broken(place, f"expected x and y, found {len(numbers)} numbers")
+    if len(numbers) != axes:
+        expected = "x and y" if axes == 2 else "x, y and z"
+        raise Broken(place, f"expected {expected}, found {len(numbers)} numbers")
     return np.array([as_number(number, place) for number in numbers])

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from mien.arrays import Array, Float, check_array
 from mien.formats.atomic import atomic_file
 from mien.synthesis.examples import ExampleSet
 
-__all__ = ["FORMAT", "VERSION", "write_weights"]
+__all__ = ["FORMAT", "VERSION", "write_shares", "write_weights"]
 
 FORMAT, VERSION = "mien weights", 1
 _LEAST = 1e-4
@@ -32,27 +32,53 @@ def write_weights(
         coefficients, hull_px: as `Synthesis` has them.
     Raises: InputError: shapes, NaN, the place.
     """
-    names = examples.subregions.names
-    shape = (len(names), len(examples.examples))
-    shares = check_array("coefficients", coefficients, shape)
-    distances = check_array("hull_px", hull_px, (len(names),))
+    write_shares(
+        path,
+        layout=examples.layout.name,
+        sources={example.name: example.source for example in examples.examples},
+        subregions=examples.subregions.names,
+        coefficients=coefficients,
+        hull={"hull_px": hull_px},
+    )
+
+
+def write_shares(
+    path: str | Path,
+    *,
+    layout: str,
+    sources: Mapping[str, str],
+    subregions: Sequence[str],
+    coefficients: Float[Array, "r m"],
+    hull: Mapping[str, Float[Array, " r"]],
+) -> None:
+    """The same of examples of any kind.
+
+    Args:
+        layout: its name.
+        sources: what each example was taken from, by name.
+        subregions: their names.
+        coefficients: share of each example in each subregion.
+        hull: how far each subregion leaves the hull, by a key that says in which unit.
+    Raises: InputError: shapes, NaN, the place.
+    """
+    shares = check_array("coefficients", coefficients, (len(subregions), len(sources)))
+    rows = zip(subregions, shares, strict=True)
     data = {
         "format": FORMAT,
         "version": VERSION,
         "generator": f"mien {version('mien')}",
-        "layout": examples.layout.name,
-        "examples": [{"name": e.name, "source": e.source} for e in examples.examples],
-        "subregions": {
-            name: _by_example(examples, row) for name, row in zip(names, shares, strict=True)
-        },
-        "hull_px": {name: round(float(px), 3) for name, px in zip(names, distances, strict=True)},
+        "layout": layout,
+        "examples": [{"name": name, "source": source} for name, source in sources.items()],
+        "subregions": {name: _by_example(tuple(sources), row) for name, row in rows},
     }
+    for key, values in hull.items():
+        distances = check_array(key, values, (len(subregions),)).tolist()
+        pairs = zip(subregions, distances, strict=True)
+        data[key] = {name: round(distance, 3) for name, distance in pairs}
     with atomic_file(path) as temporary:
         temporary.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
 
 
-def _by_example(examples: ExampleSet, row: Float[Array, " m"]) -> dict[str, Any]:
+def _by_example(names: Sequence[str], row: Float[Array, " m"]) -> dict[str, float]:
     order = np.argsort(-np.abs(row), kind="stable")
-    return {
-        examples.examples[i].name: round(float(row[i]), 6) for i in order if abs(row[i]) >= _LEAST
-    }
+    return {names[i]: round(float(row[i]), 6) for i in order if abs(row[i]) >= _LEAST}
