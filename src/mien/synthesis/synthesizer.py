@@ -190,10 +190,10 @@ def _missed(
     examples: ExampleSet, points: Float[Array, "n 2"], shares: Float[Array, "r m"]
 ) -> Float[Array, " r"]:
     """How far each subregion's points are from where the mix of examples has them."""
-    apart = examples.geometries - examples.geometry(points)
-    parts = zip(shares, examples.subregions.members, strict=True)
-    rows = [np.tensordot(row, apart[:, members], axes=1) for row, members in parts]
-    return np.array([np.sqrt((row**2).sum(axis=1).mean()) for row in rows])
+    mixed = np.tensordot(shares, examples.geometries, axes=1) - examples.geometry(points)
+    squares = (mixed**2).sum(axis=2)
+    parts = zip(squares, examples.subregions.members, strict=True)
+    return np.sqrt([row[members].mean() for row, members in parts])
 
 
 def _checked(value: str, choices: object, name: str) -> str:
