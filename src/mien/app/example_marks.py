@@ -9,15 +9,21 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.assets.feature_points import FeatureLayout
+from mien.assets.generic import load_generic_head
 from mien.capture.annotations import AnnotationNames, load_annotations
 from mien.capture.face_series import FaceSeries
 from mien.capture.folder import ANNOTATIONS
 from mien.capture.photos import Photo
-from mien.errors import FileFormatError
-from mien.formats.pts import IBUG_COUNT, points_from_ibug, read_pts
-from mien.formats.tem import points_from_tem, read_tem
+from mien.formats.points_file import read_points
+from mien.formats.strict_json import read_json
 
-__all__ = ["read_marks", "with_marks"]
+__all__ = ["points_of", "read_marks", "with_marks"]
+
+OF_HEADS = tuple(
+    [f"{side}_{part}" for side in ("right", "left") for part in ("eye_outer", "eye_inner")]
+    + ["right_mouth_corner", "left_mouth_corner", "nose_tip"]
+)
+"""What marks made for `mien build` share with the feature points; their polylines do not."""
 
 REACH = 0.12
 """Points this near to a marked one, in widths of the face, follow it by 0.6 of its way."""
@@ -25,28 +31,28 @@ REACH = 0.12
 Marks = Mapping[str, Float[Array, " 2"]]
 
 
-def read_marks(file: Path, photo: Photo, layout: FeatureLayout) -> dict[str, Array]:
+def read_marks(file: Path, photo: Photo, layout: FeatureLayout) -> dict[str, Float[Array, " 2"]]:
     """Hand-made marks beside a photo, by point, in px of the photo as loaded.
 
-    Looked for in `STEM.tem` and `STEM.pts` beside it and in `annotations/STEM.json`; where two mark
-    the same point, the later one of these counts.
+    Looked for in `STEM.tem` and `STEM.pts` beside it and in `annotations/STEM.json`, either
+    `{"layout": ..., "points": ...}` or marks as `mien build` uses them; where two of these mark
+    the same point, the later one counts. All are in px of the photo's file, turned upright.
 
     Raises: FileFormatError: one of them is damaged or holds other points; says where.
     """
-    found: dict[str, Array] = {}
-    tem, pts = file.with_suffix(".tem"), file.with_suffix(".pts")
-    if tem.is_file():
-        marks = points_from_tem(read_tem(tem), layout, tem)
-        found |= {name: place * photo.scale for name, place in marks.items()}
-    if pts.is_file():
-        points = read_pts(pts)
-        if len(points) != IBUG_COUNT:
-            raise FileFormatError(pts, f"expected {IBUG_COUNT} points, found {len(points)}")
-        found |= {n: place * photo.scale for n, place in points_from_ibug(points, layout).items()}
     annotations = file.parent / ANNOTATIONS / f"{file.stem}.json"
-    if annotations.is_file():
-        names = AnnotationNames(frozenset(layout.names), frozenset())
-        found |= load_annotations(annotations, photo, names=names).points
+    sources = [file.with_suffix(".tem"), file.with_suffix(".pts")]
+    for_heads = annotations.is_file() and "layout" not in read_json(annotations)
+    if not for_heads:
+        sources.append(annotations)
+    found: dict[str, Array] = {}
+    for path in filter(Path.is_file, sources):
+        rows, places = read_points(path, layout)
+        found |= {layout.names[r]: at * photo.scale for r, at in zip(rows, places, strict=True)}
+    if for_heads:
+        names = AnnotationNames.of(load_generic_head())
+        points = load_annotations(annotations, photo, names=names).points
+        found |= {n: points[n] for n in OF_HEADS if n in points and n in layout.names}
     return found
 
 
