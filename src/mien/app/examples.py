@@ -156,7 +156,7 @@ def gather_examples(
     ]
     notes = [*series.notes, *_notes(plan, series, marks)]
     if any(changed):
-        notes.append(f"{sum(changed)} examples brought to the exposure of the one at rest")
+        notes.append(f"exposure of {sum(changed)} examples brought to that of the face at rest")
     return GatheredExamples(examples, why, tuple(sorted(pictures.items())), tuple(notes))
 
 

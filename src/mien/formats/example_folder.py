@@ -15,20 +15,21 @@ from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.assets.subregions import Subregions, default_subregions
 from mien.errors import FileFormatError, InputError
 from mien.formats.atomic import atomic_folder, check_folder_place
+from mien.formats.example_json import (
+    FORMAT,
+    STATISTICS,
+    VERSION,
+    check_layout,
+    examples_to_json,
+    index_of,
+    photo_file,
+    photo_from_json,
+    points_from_json,
+)
 from mien.formats.head_json import Broken, is_inside
 from mien.formats.image import encode_image, load_image
 from mien.formats.npz import read_arrays
-from mien.formats.strict_json import (
-    as_list,
-    as_number,
-    as_object,
-    as_text,
-    check_format,
-    join,
-    need,
-    read_json,
-    unknown,
-)
+from mien.formats.strict_json import as_list, as_object, as_text, check_format, need, read_json
 from mien.synthesis.align import aligned_photos
 from mien.synthesis.examples import Example, ExampleSet
 
@@ -41,9 +42,7 @@ __all__ = [
     "write_examples",
 ]
 
-FORMAT = "mien examples"
-VERSION = 1
-INDEX, STATISTICS, SUBREGIONS = "examples.json", "statistics.npz", "subregions.npz"
+INDEX, SUBREGIONS = "examples.json", "subregions.npz"
 
 
 def write_examples(
@@ -70,7 +69,7 @@ def write_example_files(
     for part in ("photos", "textures"):
         (folder / part).mkdir()
     for example, texture in zip(example_set.examples, aligned_photos(example_set), strict=True):
-        _write_png(folder / _photo_file(example), example.photo)
+        _write_png(folder / photo_file(example), example.photo)
         _write_png(folder / "textures" / f"{example.name}.png", texture)
     standard = example_set.examples[example_set.standard]
     _write_png(folder / "standard.png", standard.photo)
@@ -78,7 +77,7 @@ def write_example_files(
     if not _are_usual(example_set):
         np.savez_compressed(folder / SUBREGIONS, **_subregion_arrays(example_set.subregions))
     np.savez_compressed(folder / STATISTICS, geometries=example_set.statistics)
-    text = json.dumps(_to_json(example_set, why or {}), indent=1, allow_nan=False)
+    text = json.dumps(examples_to_json(example_set, why or {}), indent=1, allow_nan=False)
     (folder / INDEX).write_text(text + "\n", encoding="utf-8")
 
 
@@ -144,39 +143,8 @@ def _read_index(folder: Path) -> tuple[Path, dict[str, Any]]:
     return path, data
 
 
-def _to_json(example_set: ExampleSet, why: Mapping[str, str]) -> dict[str, Any]:
-    names = [example.name for example in example_set.examples]
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "layout": {
-            "name": example_set.layout.name,
-            "points": list(example_set.layout.names),
-            "pixels": "origin at the top-left corner, centre of the first pixel at (0.5, 0.5)",
-        },
-        "neutral": names[0],
-        "standard": names[example_set.standard],
-        "teeth": [names[index] for index in example_set.teeth],
-        "statistics": {"file": STATISTICS, "pictures": len(example_set.statistics)},
-        "examples": [
-            {
-                "name": example.name,
-                "source": example.source,
-                "why": why.get(example.name, ""),
-                "photo": _photo_file(example),
-                "size": [example.photo.shape[1], example.photo.shape[0]],
-                "points": {
-                    name: [float(x), float(y)]
-                    for name, (x, y) in zip(example_set.layout.names, example.points, strict=True)
-                },
-            }
-            for example in example_set.examples
-        ],
-    }
-
-
 def _from_json(folder: Path, data: dict[str, Any], layout: FeatureLayout) -> ExampleSet:
-    _check_layout(as_object(need(data, "layout", ""), "layout"), layout)
+    check_layout(as_object(need(data, "layout", ""), "layout"), layout)
     entries = as_list(need(data, "examples", ""), "examples")
     examples = tuple(
         _example(folder, as_object(entry, f"examples[{i}]"), f"examples[{i}]", layout)
@@ -189,32 +157,19 @@ def _from_json(folder: Path, data: dict[str, Any], layout: FeatureLayout) -> Exa
         problem = f"expected {names[0]!r}, the first example; found {str(data['neutral'])[:40]!r}"
         raise Broken("neutral", problem)
     teeth = as_list(need(data, "teeth", ""), "teeth")
-    standard = _index_of(need(data, "standard", ""), "standard", names)
+    standard = index_of(need(data, "standard", ""), "standard", names)
     return ExampleSet(
         layout,
         examples,
         standard,
         _statistics(folder / STATISTICS, layout),
         _subregions(folder / SUBREGIONS, layout, examples[standard]),
-        tuple(_index_of(name, f"teeth[{i}]", names) for i, name in enumerate(teeth)),
+        tuple(index_of(name, f"teeth[{i}]", names) for i, name in enumerate(teeth)),
     )
 
 
-def _check_layout(data: dict[str, Any], layout: FeatureLayout) -> None:
-    """The points must be those of the layout, in its order: shares and statistics rely on it."""
-    name = as_text(need(data, "name", "layout"), "layout.name")
-    points = as_list(need(data, "points", "layout"), "layout.points")
-    if name == layout.name and points == list(layout.names):
-        return
-    expected = f"the {len(layout.names)} points of {layout.name}"
-    found = f"{len(points)} of {name[:40]}" + ", other ones" * (name == layout.name)
-    raise Broken("layout", f"expected {expected}, found {found}: run `mien examples` again")
-
-
 def _example(folder: Path, data: dict[str, Any], place: str, layout: FeatureLayout) -> Example:
-    file = as_text(need(data, "photo", place), f"{place}.photo")
-    if not is_inside(file):
-        raise Broken(f"{place}.photo", f"expected a file within the folder, found {file[:60]!r}")
+    file = photo_from_json(data, place)
     photo = load_image(folder / PurePosixPath(file))
     size = as_list(need(data, "size", place), f"{place}.size")
     actual = [photo.shape[1], photo.shape[0]]
@@ -223,27 +178,9 @@ def _example(folder: Path, data: dict[str, Any], place: str, layout: FeatureLayo
     return Example(
         as_text(need(data, "name", place), f"{place}.name"),
         photo,
-        _points(need(data, "points", place), f"{place}.points", layout),
+        points_from_json(need(data, "points", place), f"{place}.points", layout),
         as_text(need(data, "source", place), f"{place}.source"),
     )
-
-
-def _points(value: object, place: str, layout: FeatureLayout) -> Float[Array, "n 2"]:
-    named = as_object(value, place, layout.names)
-    points = np.empty((len(layout.names), 2))
-    for index, name in enumerate(layout.names):
-        where = join(place, name)
-        pair = as_list(need(named, name, place), where)
-        if len(pair) != 2:
-            raise Broken(where, f"expected [x, y] in px, found {len(pair)} numbers")
-        points[index] = [as_number(number, where) for number in pair]
-    return points
-
-
-def _index_of(name: object, place: str, names: list[str]) -> int:
-    if as_text(name, place) not in names:
-        raise Broken(place, unknown("example", str(name), names))
-    return names.index(str(name))
 
 
 def _statistics(path: Path, layout: FeatureLayout) -> Float[Array, "N n 2"]:
@@ -300,10 +237,6 @@ def _drawn(subregions: Subregions) -> UInt8[Array, "h w 4"]:
     mixed = subregions.fades @ colours.astype(np.float32) / np.maximum(total, 1e-6)
     drawn: Array = np.dstack([mixed, 255 * np.minimum(total, 1)]).round().astype(np.uint8)
     return drawn
-
-
-def _photo_file(example: Example) -> str:
-    return f"photos/{example.name}.png"
 
 
 def _write_png(path: Path, pixels: UInt8[Array, "h w c"]) -> None:

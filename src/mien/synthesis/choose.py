@@ -209,7 +209,7 @@ class _Distances:
 
     def largest(self, row: int, other: int) -> str:
         """The subregion in which both differ most."""
-        return self._names[int(self._between(row, other).argmax())]
+        return self._names[int(self._between(row, other).argmax())].replace("_", " ")
 
     def differ(self, row: int, other: int) -> bool:
         """Whether they do in any subregion by more than they must."""
