@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from mien.capture.sharpness import face_sharpness
 from mien.capture.video import VIDEO_SUFFIXES, Video
 from mien.errors import EstimationError, InputError
 
-__all__ = ["FaceSeries", "Look", "find_faces", "load_pictures"]
+__all__ = ["FaceSeries", "Look", "find_faces", "load_pictures", "row_of"]
 
 Look = Callable[[UInt8[Array, "h w 3"], Float[Array, "478 2"]], None]
 """Told of each picture that shows a face, in the series' order, and where its landmarks are."""
@@ -217,9 +217,11 @@ def _as_detected(landmarks: Landmarks) -> DetectedFace:
 def row_of(series: FaceSeries, what: str, option: str) -> int:
     """The row of a picture that a user names: a frame's number, a file's name, its stem.
 
-    Raises: InputError: there is none; a picture that shows no face.
+    Raises: InputError: there is none; several; one that shows no face.
     """
-    rows = [row for row in range(len(series)) if _is_named(series, row, what)]
+    if series.is_video and what.isascii() and what.isdecimal():
+        what = frame_name(int(what))
+    rows = [row for row, name in enumerate(series.names) if what in _names_of(name)]
     if len(rows) == 1:
         return rows[0]
     if rows:
@@ -230,13 +232,7 @@ def row_of(series: FaceSeries, what: str, option: str) -> int:
     raise InputError(option, _expected(series), what)
 
 
-def _is_named(series: FaceSeries, row: int, what: str) -> bool:
-    if series.is_video and what.isascii() and what.isdecimal():
-        return int(series.scores.index[row]) == int(what)
-    return what in _names_of(series.names[row])
-
-
-def _names_of(name: str) -> Sequence[str]:
+def _names_of(name: str) -> tuple[str, ...]:
     path = Path(name)
     return (name, str(path.with_suffix("")), path.name, path.stem)
 

@@ -22,10 +22,11 @@ def face_sharpness(pixels: UInt8[Array, "h w 3"], points: Float[Array, "n 2"]) -
 
     low = np.maximum(points.min(axis=0), 0).astype(int)
     high = np.maximum(np.ceil(points.max(axis=0)), 0).astype(int)
-    crop = shrunk(pixels[low[1] : high[1], low[0] : high[0]], _SIDE)
+    crop = pixels[low[1] : high[1], low[0] : high[0]]
     if crop.size == 0:
         return 0.0
-    grey = cv2.cvtColor(np.ascontiguousarray(crop), cv2.COLOR_RGB2GRAY).astype(np.float64)
+    small = np.ascontiguousarray(shrunk(crop, _SIDE))
+    grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float64)
     sharpness = float(cv2.Laplacian(grey, cv2.CV_64F).var() / (grey.var() + 1.0))
     return sharpness / _blockiness(pixels) ** 2
 
