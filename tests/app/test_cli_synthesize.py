@@ -189,6 +189,7 @@ def test_the_papers_ways_are_asked_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from mien.app import synthesize as module
+    from mien.synthesis.coefficients import UPPER_FACE
     from mien.synthesis.synthesizer import SynthesisOptions, Synthesizer
 
     used: list[SynthesisOptions] = []
@@ -200,14 +201,14 @@ def test_the_papers_ways_are_asked_for(
         (),
         ("--paper",),
         ("--paper", "--distance-penalty", "0.1"),
-        ("--slack", "0.01"),
+        ("--slack", "0.01", "--upper-face-as-one"),
     ):
         assert mien(*ask, *options).status == 0
     assert used == [
         SynthesisOptions(),
         SynthesisOptions.paper(),
         replace(SynthesisOptions.paper(), distance_penalty=0.1),
-        SynthesisOptions(slack=0.01),
+        SynthesisOptions(slack=0.01, together=(UPPER_FACE,)),
     ]
 
 

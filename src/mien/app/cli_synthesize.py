@@ -64,6 +64,13 @@ def synthesize(
         float | None,
         typer.Option(help="How far shares may fall below 0; 0 by default and in Z06."),
     ] = None,
+    upper_face_as_one: Annotated[
+        bool,
+        typer.Option(
+            "--upper-face-as-one",
+            help="Brows, lids, eyes and forehead of the same examples: fewer double brows.",
+        ),
+    ] = False,
     yaw: Annotated[
         float | None, typer.Option(help="Of a head: degrees; it turns to its own left.")
     ] = None,
@@ -83,7 +90,7 @@ def synthesize(
     from mien.app.synthesize import synthesize_expression
     from mien.formats.head_folder import is_head_folder
 
-    options = _options(paper, propagation, distance_penalty, slack)
+    options = _options(paper, propagation, distance_penalty, slack, upper_face_as_one)
     view = {"--yaw": yaw, "--pitch": pitch, "--size": size, "--background": background}
     if is_head_folder(examples):
         _refuse({"--head": None if head == "auto" else head, "--face": face}, "a set of examples")
@@ -180,17 +187,23 @@ def _refuse(options: dict[str, Any], where: str) -> None:
 
 
 def _options(
-    paper: bool, propagation: str | None, distance_penalty: float | None, slack: float | None
+    paper: bool,
+    propagation: str | None,
+    distance_penalty: float | None,
+    slack: float | None,
+    upper_face_as_one: bool,
 ) -> SynthesisOptions:
     """The paper's or the usual ones, and what was said otherwise."""
     from dataclasses import replace
 
+    from mien.synthesis.coefficients import UPPER_FACE
     from mien.synthesis.synthesizer import SynthesisOptions
 
     given: dict[str, Any] = {
         "propagation": propagation,
         "distance_penalty": distance_penalty,
         "slack": slack,
+        "together": (UPPER_FACE,) if upper_face_as_one else None,
     }
     usual = SynthesisOptions.paper() if paper else SynthesisOptions()
     return replace(usual, **{name: value for name, value in given.items() if value is not None})

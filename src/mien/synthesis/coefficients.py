@@ -113,9 +113,11 @@ def distances_of(
         apart: as for `coefficients_of`. shares: of the examples in each subregion.
     Returns: (R,) root of the mean squared distance of each subregion's points.
     """
-    parts = zip(shares, subregions.members, strict=True)
-    missed = [np.tensordot(row, apart[:, members], axes=1) for row, members in parts]
-    return np.array([np.sqrt((rest**2).sum(axis=1).mean()) for rest in missed])
+    missed = np.tensordot(shares, apart, axes=1)
+    squares = (missed**2).sum(axis=2)
+    parts = zip(squares, subregions.members, strict=True)
+    distances: Array = np.sqrt([row[members].mean() for row, members in parts])
+    return distances
 
 
 def _groups(names: Sequence[str], together: Sequence[Collection[str]]) -> list[list[int]]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8, check_array, frozen
 from mien.errors import InputError
-from mien.synthesis.coefficients import coefficients
+from mien.synthesis.coefficients import coefficients, distances_of
 from mien.synthesis.compose import Composer
 from mien.synthesis.conditional import ConditionalMotion
 from mien.synthesis.examples import ExampleSet
@@ -157,15 +157,17 @@ class Synthesizer:
         Raises: InputError: shapes, NaN. EstimationError: all points in one place.
         Source: Z06 sections 6 and 7.
         """
+        examples = self.examples
         shares = coefficients(
-            self.examples,
+            examples,
             points,
             distance_penalty=self.options.distance_penalty,
             slack=self.options.slack,
             together=self.options.together,
         )
         image = self._composer.render(points, shares, motion=motion, size=size, out=out)
-        missed = _missed(self.examples, points, shares)
+        apart = examples.geometries - examples.geometry(points)
+        missed = distances_of(apart, shares, examples.subregions)
         return Synthesis(image, frozen(np.array(points, float)), frozen(shares), frozen(missed))
 
     def _inference(self, known: Int[Array, " k"], told: bool) -> Inference:
@@ -184,16 +186,6 @@ class Synthesizer:
         if self.options.propagation == "printed":
             return Propagation(self.examples.layout, geometries - neutral)
         return ConditionalMotion(geometries - neutral)
-
-
-def _missed(
-    examples: ExampleSet, points: Float[Array, "n 2"], shares: Float[Array, "r m"]
-) -> Float[Array, " r"]:
-    """How far each subregion's points are from where the mix of examples has them."""
-    mixed = np.tensordot(shares, examples.geometries, axes=1) - examples.geometry(points)
-    squares = (mixed**2).sum(axis=2)
-    parts = zip(squares, examples.subregions.members, strict=True)
-    return np.sqrt([row[members].mean() for row, members in parts])
 
 
 def _checked(value: str, choices: object, name: str) -> str:
