@@ -1,108 +1,130 @@
-"""Points that were marked by hand beside a photo."""
+"""Hand marks on photos that become examples: they win, and their neighbours follow."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
 
-from mien.app.demo import demo_photos
 from mien.app.example_marks import read_marks, with_marks
-from mien.assets.feature_points import load_feature_layout
-from mien.capture.photos import load_photo
+from mien.arrays import Array
+from mien.assets.feature_points import FeatureLayout, load_feature_layout
+from mien.capture.photos import Photo
 from mien.errors import FileFormatError
-from mien.formats.points_json import write_points_json
 from mien.formats.pts import points_to_ibug, write_pts
 from mien.formats.tem import points_to_tem, write_tem
 
-LAYOUT = load_feature_layout()
+
+@pytest.fixture(scope="module")
+def layout() -> FeatureLayout:
+    return load_feature_layout()
 
 
 @pytest.fixture
-def photo(tmp_path: Path) -> Path:
-    """A photo of 200x300 px without marks."""
-    Image.fromarray(np.zeros((300, 200, 3), np.uint8)).save(tmp_path / "a.png")
-    return tmp_path / "a.png"
+def points(layout: FeatureLayout) -> Array:
+    """Px of a photo 400 wide and 600 high."""
+    return 300 * layout.template + 200
 
 
 @pytest.fixture
-def points() -> Any:
-    """All points somewhere in it."""
-    return np.round(np.random.default_rng(2).uniform(10, 190, (len(LAYOUT.names), 2)), 3)
+def photo(tmp_path: Path) -> Photo:
+    """It is read at half its size."""
+    pixels = np.zeros((300, 200, 3), np.uint8)
+    return Photo("anna.jpg", tmp_path / "anna.jpg", pixels, original_size=(400, 600))
 
 
-def annotated(photo: Path, data: dict[str, Any]) -> Path:
-    """The file of annotations of a photo."""
-    path = photo.parent / "annotations" / f"{photo.stem}.json"
-    path.parent.mkdir()
-    path.write_text(json.dumps(data))
-    return path
+def annotate(photo: Photo, **data: object) -> None:
+    folder = photo.path.parent / "annotations"
+    folder.mkdir()
+    (folder / "anna.json").write_text(json.dumps(data))
 
 
-def test_a_photo_without_marks(photo: Path) -> None:
-    assert read_marks(photo, load_photo(photo), LAYOUT) == {}
+def test_no_marks(layout: FeatureLayout, points: Array, photo: Photo) -> None:
+    assert read_marks(photo.path, photo, layout) == {}
+    assert with_marks(layout, points, {}) is points
 
 
-def test_marks_follow_a_photo_that_is_reduced(photo: Path, points: Any) -> None:
-    half = load_photo(photo, max_side=150)
-    write_tem(photo.with_suffix(".tem"), points_to_tem(LAYOUT, points))
-    marks = read_marks(photo, half, LAYOUT)
-    assert set(marks) == set(LAYOUT.names)
-    np.testing.assert_allclose(marks["menton"], points[LAYOUT.index("menton")] / 2)
-    annotated(photo, {"layout": LAYOUT.name, "points": {"menton": [50, 60]}})
-    marks = read_marks(photo, half, LAYOUT)
-    np.testing.assert_allclose(marks["menton"], [25, 30])
-    np.testing.assert_allclose(marks["nose_tip"], points[LAYOUT.index("nose_tip")] / 2)
+def test_all_points_from_a_delineation(layout: FeatureLayout, points: Array, photo: Photo) -> None:
+    write_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
+    marks = read_marks(photo.path, photo, layout)
+    found = with_marks(layout, 100 + 0 * points + layout.template, marks)
+    np.testing.assert_allclose(found, points / 2, atol=1e-3)
 
 
-def test_pts_files_count_more_than_tem_files(photo: Path, points: Any) -> None:
-    write_tem(photo.with_suffix(".tem"), points_to_tem(LAYOUT, points + 3))
-    write_pts(photo.with_suffix(".pts"), points_to_ibug(LAYOUT, points))
-    marks = read_marks(photo, load_photo(photo), LAYOUT)
-    np.testing.assert_allclose(marks["nose_tip"], points[LAYOUT.index("nose_tip")], atol=1e-3)
-    np.testing.assert_allclose(marks["hairline"], points[LAYOUT.index("hairline")] + 3)
+def test_some_points_from_ibug(layout: FeatureLayout, points: Array, photo: Photo) -> None:
+    write_pts(photo.path.with_suffix(".pts"), points_to_ibug(layout, points))
+    marks = read_marks(photo.path, photo, layout)
+    assert 30 <= len(marks) <= 40
+    for name, place in marks.items():
+        np.testing.assert_allclose(place, points[layout.index(name)] / 2, atol=1e-3)
 
 
-def test_all_points_of_a_layout_can_be_annotated(photo: Path, points: Any) -> None:
-    (photo.parent / "annotations").mkdir()
-    named = dict(zip(LAYOUT.names, points, strict=True))
-    write_points_json(photo.parent / "annotations" / "a.json", LAYOUT, named)
-    marks = read_marks(photo, load_photo(photo), LAYOUT)
-    assert all((marks[name] == named[name]).all() for name in LAYOUT.names)
+def test_points_of_the_layout_in_json(layout: FeatureLayout, photo: Photo) -> None:
+    annotate(photo, layout=layout.name, points={"chin": [200, 500], "right_jaw.0": [150, 480]})
+    marks = read_marks(photo.path, photo, layout)
+    np.testing.assert_array_equal(marks["chin"], [100, 250])
+    np.testing.assert_array_equal(marks["right_jaw.0"], [75, 240])
 
 
-def test_marks_for_a_head_give_the_points_that_mean_the_same(photo: Path) -> None:
-    """`left_jaw.2` is near the ear on the head's line, near the chin among the feature points."""
-    marks = {"nose_tip": [90, 100], "left_jaw.2": [150, 200], "right_ear_lobe": [20, 120]}
-    annotated(photo, {"photo": "a.png", "size": [200, 300], "points": marks})
-    found = read_marks(photo, load_photo(photo), LAYOUT)
-    assert {name: place.tolist() for name, place in found.items()} == {"nose_tip": [90, 100]}
+def test_marks_made_for_a_head_count_where_they_mean_the_same(
+    layout: FeatureLayout, photo: Photo
+) -> None:
+    """`left_jaw.3` is another place on the head than among the feature points."""
+    annotate(photo, points={"nose_tip": [200, 300], "left_jaw.3": [250, 480], "chin": [200, 500]})
+    marks = read_marks(photo.path, photo, layout)
+    assert list(marks) == ["nose_tip"]
+    np.testing.assert_array_equal(marks["nose_tip"], [100, 150])
 
 
-def test_the_marks_of_the_photos_that_ship_are_no_obstacle() -> None:
-    path = demo_photos() / "photo_left.png"
-    assert "nose_tip" in read_marks(path, load_photo(path), LAYOUT)
+def test_json_counts_more_than_a_delineation(
+    layout: FeatureLayout, points: Array, photo: Photo
+) -> None:
+    write_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
+    annotate(photo, layout=layout.name, points={"chin": [10, 20]})
+    np.testing.assert_array_equal(read_marks(photo.path, photo, layout)["chin"], [5, 10])
 
 
-def test_broken_marks_are_refused_with_their_place(photo: Path) -> None:
-    path = annotated(photo, {"layout": LAYOUT.name, "points": {"nose_tipp": [1, 2]}})
-    with pytest.raises(FileFormatError, match=r"points.nose_tipp: unknown point"):
-        read_marks(photo, load_photo(photo), LAYOUT)
-    path.write_text(json.dumps({"points": {"nose_tipp": [1, 2]}}))
-    with pytest.raises(FileFormatError, match=r"points.nose_tipp: unknown name"):
-        read_marks(photo, load_photo(photo), LAYOUT)
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ({"layout": "zhang134", "points": {"chinn": [1, 2]}}, "chinn"),
+        ({"layout": "zhang134", "points": {"chin": [1]}}, "chin"),
+        ({"layout": "zhang134", "points": {"chin": [1, float("nan")]}}, "chin"),
+        ({"layout": "ibug", "points": {"chin": [1, 2]}}, "layout"),
+        ({"points": {"chinn": [1, 2]}}, "points.chinn: unknown name; did you mean chin"),
+    ],
+)
+def test_broken_marks(
+    layout: FeatureLayout, photo: Photo, data: dict[str, object], message: str
+) -> None:
+    annotate(photo, **data)
+    with pytest.raises(FileFormatError, match=message) as caught:
+        read_marks(photo.path, photo, layout)
+    assert "anna.json" in str(caught.value)
 
 
-def test_marked_points_are_there_and_their_neighbours_follow(points: Any) -> None:
-    spread = (LAYOUT.template - LAYOUT.template.mean(0)) * 100
-    tip = LAYOUT.index("nose_tip")
-    moved = with_marks(LAYOUT, spread, {"nose_tip": spread[tip] + [3, -2]})
-    shift = moved - spread
-    np.testing.assert_allclose(shift[tip], [3, -2])
-    assert 0 < shift[LAYOUT.index("nose_base"), 0] < 3
-    np.testing.assert_allclose(shift[LAYOUT.index("right_temple")], 0, atol=0.05)
-    assert with_marks(LAYOUT, points, {}) is points
+def test_a_delineation_of_another_template(layout: FeatureLayout, photo: Photo) -> None:
+    photo.path.with_suffix(".tem").write_text("2\n1 2\n3 4\n0\n")
+    with pytest.raises(FileFormatError, match=r"anna.tem: expected \d+ points .*, found 2"):
+        read_marks(photo.path, photo, layout)
+
+
+def test_neighbours_follow_and_the_far_stay(layout: FeatureLayout, points: Array) -> None:
+    corner = layout.index("right_mouth_corner")
+    moved = np.array([6.0, -4.0])
+    found = with_marks(layout, points, {"right_mouth_corner": points[corner] + moved})
+    steps = (found - points) @ moved / (moved @ moved)
+    assert steps[corner] == pytest.approx(1, abs=1e-12)
+    assert steps[layout.index("right_inner_mouth_corner")] > 0.8
+    assert abs(steps[layout.index("left_eye_outer")]) < 0.01
+    assert steps.max() <= 1 + 1e-12
+    assert steps.min() >= 0
+
+
+def test_marks_that_agree_move_all_between_them_alike(layout: FeatureLayout, points: Array) -> None:
+    names = [name for name in layout.names if name != "chin"]
+    marks = {name: points[layout.index(name)] + [3, 1] for name in names}
+    found = with_marks(layout, points, marks)
+    np.testing.assert_allclose(found - points, np.tile([3, 1], (len(points), 1)), atol=0.2)

@@ -157,6 +157,8 @@ def gather_examples(
     notes = [*series.notes, *_notes(plan, series, marks)]
     if any(changed):
         notes.append(f"exposure of {sum(changed)} examples brought to that of the face at rest")
+    if len(rows) == 1:
+        notes.append("one example alone shows no expression but its own")
     return GatheredExamples(examples, why, tuple(sorted(pictures.items())), tuple(notes))
 
 

@@ -117,7 +117,7 @@ def choose_examples(
     Source: Z06 section 14, "sufficiently different from each other while covering all".
     """
     total = len(candidates.geometries)
-    wanted = {neutral: "neutral"} | {k: v for k, v in (wanted or {}).items() if k != neutral}
+    wanted = {neutral: "neutral"} | (wanted or {})
     _check_rows(total, neutral, wanted, exclude)
     if count < 1:
         raise InputError("count", "a number above zero", count)

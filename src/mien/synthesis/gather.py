@@ -111,7 +111,8 @@ def plan_examples(
         geometries, series.scores.sharpness, series.scores.pose, series.names, tuple(unfit)
     )
     standard, reason = _standard(layout, candidates, neutral, wishes)
-    wanted = {neutral: "neutral"} | {standard: reason} | dict.fromkeys(wishes.include, ASKED_FOR)
+    wanted = {neutral: "neutral"} | {standard: reason}
+    wanted |= {row: ASKED_FOR for row in wishes.include if row not in wanted}
     # Members of subregions do not depend on the picture.
     regions = default_subregions(layout, points[neutral], (1, 1))
     choice = choose_examples(
@@ -186,7 +187,8 @@ def _standard(
 ) -> tuple[int, str]:
     """The row of the standard image and why it is that."""
     if wishes.standard is not None:
-        return wishes.standard, "standard, as asked for"
+        both = wishes.standard == neutral
+        return wishes.standard, "neutral and standard" if both else f"standard, {ASKED_FOR}"
     reasons = candidates.left_out(neutral)
     sound = [r for r, reason in enumerate(reasons) if not reason and r not in wishes.exclude]
     rows = np.array(sound or [neutral])
