@@ -32,14 +32,15 @@ def owners(points, triangles):
     """Each pixel's triangle."""
     corners = snapped(points)
     drawn = np.empty((HEIGHT, WIDTH), np.int32)
-    starts, spans = np.empty(WIDTH + 1, np.int32), np.empty(WIDTH, np.int32)
+    count = len(triangles)
+    found = np.empty((count, 3), np.int64)
+    starts, spans = np.empty(2 * count + 2, np.int64), np.empty(2 * count + 1, np.int64)
     tops, ends = extents(corners, triangles)
     for row in range(HEIGHT):
-        count = cut_row(corners, triangles, tops, ends, row, drawn[row], starts, spans)
+        count = cut_row(corners, triangles, tops, ends, row, WIDTH, found, starts, spans)
         assert starts[0] == 0
         assert starts[count] == WIDTH
-        widths = np.diff(starts[: count + 1])
-        np.testing.assert_array_equal(np.repeat(spans[:count], widths), drawn[row])
+        drawn[row] = np.repeat(spans[:count], np.diff(starts[: count + 1]))
     return drawn
 
 

@@ -99,32 +99,47 @@ def cut_row(
     tops: Array,
     ends: Array,
     row: int,
-    owners: Array,
+    width: int,
+    found: Array,
     starts: Array,
     spans: Array,
 ) -> int:
-    """Cut a row of a picture where triangles change; later ones lie over earlier ones.
+    """Cut a row of a picture where triangles change.
+
+    Where several cover a pixel, as beside a fold, the one that begins first has it.
 
     Args:
         tops, ends: of `extents`.
-        owners: (w,) filled with each pixel's triangle, -1 where there is none.
-        starts: (w + 1,) filled with the spans' first columns and, after them, w.
-        spans: (w,) filled with their triangles.
+        width: of the picture.
+        found: (T, 3) memory to work in.
+        starts: (2 T + 2,) filled with the spans' first columns and, after them, the width.
+        spans: (2 T + 1,) filled with their triangles, -1 where there is none.
     Returns: how many spans.
     """
-    width = len(owners)
-    owners[:] = -1
+    size = 0
     for t in range(len(triangles)):
         if tops[t] <= row < ends[t]:
             a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
             first, end = _row_span(corners, a, b, c, row, width)
-            for col in range(first, end):
-                owners[col] = t
-    count = 0
-    for col in range(width):
-        if col == 0 or owners[col] != owners[col - 1]:
-            starts[count], spans[count] = col, owners[col]
-            count += 1
+            if first < end:
+                n = size
+                while n > 0 and found[n - 1, 0] > first:
+                    found[n] = found[n - 1]
+                    n -= 1
+                found[n, 0], found[n, 1], found[n, 2] = first, end, t
+                size += 1
+    count, col = 0, 0
+    for n in range(size):
+        first, end, t = found[n, 0], found[n, 1], found[n, 2]
+        if first > col:
+            starts[count], spans[count] = col, -1
+            count, col = count + 1, first
+        if end > col:
+            starts[count], spans[count] = col, t
+            count, col = count + 1, end
+    if col < width:
+        starts[count], spans[count] = col, -1
+        count += 1
     starts[count] = width
     return count
 

@@ -22,7 +22,7 @@ __all__ = ["PART", "Mixtures", "Photos", "draw_rows"]
 PART = 256
 """A place between texels is told in as many parts of their distance."""
 
-_MOST = 128
+_MOST = 64
 """Pixels that are worked on at once."""
 
 _LANES = 16
@@ -40,7 +40,7 @@ _PITCH = _Index(_MOST + _LANES)
 _INDEX, _X, _Y, _UPPER_LEFT, _UPPER_RIGHT, _LOWER_LEFT, _LOWER_RIGHT = (
     _Index(row) * _PITCH for row in range(7)
 )
-_RED, _GREEN, _BLUE, _FADE = (_Index(row) * _PITCH for row in range(4))
+_RED, _GREEN, _BLUE, _FADE, _REST = (_Index(row) * _PITCH for row in range(5))
 
 
 class Photos(NamedTuple):
@@ -78,7 +78,7 @@ def draw_rows(
     end: int,
     out: Array,
 ) -> None:
-    """Draw what the triangles cover of some rows; those later in the list over earlier ones.
+    """Draw what the triangles cover of some rows.
 
     Args:
         corners, triangles, maps: as `mien.numeric.warp` has them.
@@ -92,12 +92,13 @@ def draw_rows(
     pixels = out.reshape(-1)
     memory = np.zeros(7 * _PITCH, np.uint32)
     weights = np.zeros(len(widths) * _PITCH, np.float32)
-    sums = np.zeros(4 * _PITCH, np.float32)
+    sums = np.zeros(5 * _PITCH, np.float32)
     tops, ends = extents(corners, triangles)
-    owners = np.empty(width, np.int32)
-    starts, spans = np.empty(width + 1, np.int32), np.empty(width, np.int32)
+    found = np.empty((len(triangles), 3), np.int64)
+    starts = np.empty(2 * len(triangles) + 2, np.int64)
+    spans = np.empty(2 * len(triangles) + 1, np.int64)
     for row in range(first, end):
-        count = cut_row(corners, triangles, tops, ends, row, owners, starts, spans)
+        count = cut_row(corners, triangles, tops, ends, row, width, found, starts, spans)
         n, col = 0, 0
         while col < width:
             if spans[n] < 0:
@@ -208,16 +209,20 @@ def _weigh(
             weights[start + k] = weight
     if alone:
         return
-    texels = faded.planes.shape[1]
-    planes = faded.planes.reshape(-1)
+    texels, planes = faded.planes.shape[1], faded.planes.reshape(-1)
+    sums[_REST : _REST + _PITCH] = _Float(1)
     for place in range(first, end):
-        region = faded.members[place]
-        _look_up(planes, region * texels, faded.width, count, memory)
-        _fade(memory, count, sums)
+        region, fade = faded.members[place], _REST
+        # The last one has what the others leave.
+        if place < end - 1:
+            _look_up(planes, region * texels, faded.width, count, memory)
+            _fade(memory, count, sums)
+            fade = _FADE
         for n in range(first_used, end_used):
             start, share = _Index(n - first_used) * _PITCH, shares[region, used[n]]
-            for k in range(_whole(count)):
-                weights[start + k] += share * sums[_FADE + k]
+            if share != zero:
+                for k in range(_whole(count)):
+                    weights[start + k] += share * sums[fade + k]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -245,14 +250,16 @@ def _bilinear(x: np.uint32, y: np.uint32) -> tuple[np.uint32, np.uint32, np.uint
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fade(memory: Array, count: int, sums: Array) -> None:
-    """Fill in how much of each pixel is a subregion's."""
+    """Fill in how much of each pixel is a subregion's, and take it from the rest."""
     unit = _Float(1 / (PART * FADE_UNIT))
     for k in range(_whole(count)):
         w0, w1, w2, w3 = _bilinear(memory[_X + k], memory[_Y + k])
         fade = _UInt(_UInt(memory[_UPPER_LEFT + k] * w0) + _UInt(memory[_UPPER_RIGHT + k] * w1))
         fade = _UInt(fade + _UInt(memory[_LOWER_LEFT + k] * w2))
         fade = _UInt(fade + _UInt(memory[_LOWER_RIGHT + k] * w3))
-        sums[_FADE + k] = unit * _Float(np.int32(fade))
+        part = unit * _Float(np.int32(fade))
+        sums[_FADE + k] = part
+        sums[_REST + k] -= part
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
