@@ -13,7 +13,7 @@ from PIL import Image
 from filmed import grey, written
 from mien.arrays import Array
 from mien.capture.detector import LandmarkDetector
-from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of
+from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of, rows_of
 from mien.capture.frame_choice import FrameScores
 from mien.capture.sharpness import face_sharpness
 from mien.errors import EstimationError, FileFormatError, InputError
@@ -130,6 +130,15 @@ def test_what_frames_are_called(name: str) -> None:
 def test_what_photos_are_called() -> None:
     assert row_of(made_up(video=False), "12", "--include") == 0
     assert row_of(made_up(video=False), "b.jpg", "--include") == 2
+
+
+def test_stretches_of_frames() -> None:
+    assert rows_of(made_up(video=True), "10-40", "--exclude") == [1, 2]
+    assert rows_of(made_up(video=True), "12", "--exclude") == [1]
+    with pytest.raises(InputError, match="a stretch of frames that show the face, got 13-20"):
+        rows_of(made_up(video=True), "13-20", "--exclude")
+    with pytest.raises(InputError, match="the name of a photo"):
+        rows_of(made_up(video=False), "1-5", "--exclude")
 
 
 @pytest.mark.parametrize(

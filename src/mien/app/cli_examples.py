@@ -11,6 +11,7 @@ from mien.app.printing import Json, print_result
 from mien.app.progress import terminal_progress
 
 _PICTURE = "FRAME|FILE"
+_PICTURES = "FRAME|FROM-TO|FILE"
 
 
 def examples(
@@ -34,11 +35,11 @@ def examples(
     ] = None,
     include: Annotated[
         list[str] | None,
-        typer.Option(metavar=_PICTURE, help="An example in any case; may be repeated."),
+        typer.Option(metavar=_PICTURES, help="An example in any case; may be repeated."),
     ] = None,
     exclude: Annotated[
         list[str] | None,
-        typer.Option(metavar=_PICTURE, help="Not to be used; may be repeated."),
+        typer.Option(metavar=_PICTURES, help="Not to be used; may be repeated."),
     ] = None,
     face: Annotated[
         int | None,

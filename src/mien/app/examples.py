@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from mien.app.example_marks import points_of, read_marks
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.detector import LandmarkDetector
-from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of
+from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of, rows_of
 from mien.capture.photos import load_photo
 from mien.formats.atomic import atomic_folder
 from mien.formats.example_folder import (
@@ -46,7 +46,8 @@ class ExampleRequest:
     Attributes:
         count: of examples at most.
         neutral, standard: which picture is that; None: found.
-        include, exclude: pictures that are, and are not, to be examples.
+        include, exclude: pictures that are, and are not, to be examples; of a video, stretches of
+            frames as well, as `860-930`.
         face: which one, from left to right, in photos of several people.
         max_side: px; larger pictures are reduced to it.
         even: bring photos to one exposure.
@@ -66,9 +67,13 @@ class ExampleRequest:
         return Wishes(
             None if self.neutral is None else row_of(series, self.neutral, "--neutral"),
             None if self.standard is None else row_of(series, self.standard, "--standard"),
-            tuple(row_of(series, name, "--include") for name in self.include),
-            tuple(row_of(series, name, "--exclude") for name in self.exclude),
+            _all_rows(series, self.include, "--include"),
+            _all_rows(series, self.exclude, "--exclude"),
         )
+
+
+def _all_rows(series: FaceSeries, names: Sequence[str], option: str) -> tuple[int, ...]:
+    return tuple(dict.fromkeys(row for name in names for row in rows_of(series, name, option)))
 
 
 @dataclass(frozen=True)

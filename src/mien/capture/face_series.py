@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +22,7 @@ from mien.capture.sharpness import face_sharpness
 from mien.capture.video import VIDEO_SUFFIXES, Video
 from mien.errors import EstimationError, InputError
 
-__all__ = ["FaceSeries", "Look", "find_faces", "load_pictures", "row_of"]
+__all__ = ["FaceSeries", "Look", "find_faces", "load_pictures", "row_of", "rows_of"]
 
 Look = Callable[[UInt8[Array, "h w 3"], Float[Array, "478 2"]], None]
 """Told of each picture that shows a face, in the series' order, and where its landmarks are."""
@@ -230,6 +231,21 @@ def row_of(series: FaceSeries, what: str, option: str) -> int:
         if what in _names_of(name):
             raise InputError(option, "a picture that shows the face", f"{name}: {reason}")
     raise InputError(option, _expected(series), what)
+
+
+def rows_of(series: FaceSeries, what: str, option: str) -> list[int]:
+    """As row_of, and all frames of a stretch where that is what the user names: `860-930`.
+
+    Raises: InputError: as row_of; a stretch without a picture that shows the face.
+    """
+    stretch = re.fullmatch(r"(\d{1,9})-(\d{1,9})", what, re.ASCII)
+    if not (series.is_video and stretch):
+        return [row_of(series, what, option)]
+    index = series.scores.index
+    rows = np.flatnonzero((index >= int(stretch[1])) & (index <= int(stretch[2])))
+    if not len(rows):
+        raise InputError(option, "a stretch of frames that show the face", what)
+    return rows.tolist()
 
 
 def _names_of(name: str) -> tuple[str, ...]:
