@@ -17,9 +17,6 @@ from mien.errors import InputError
 __all__ = ["SubregionDrawing", "Subregions", "default_subregions", "load_subregion_drawing"]
 
 FORMAT = "mien subregions"
-OUTER_FADE = 1.0
-"""The face fades out over this many widths of a blend: hair and jaw need a soft end."""
-
 _TEMPLATE_WIDTH_PX = 300
 
 
@@ -103,8 +100,10 @@ def _fades(
         depth -= 0.5 * np.sign(depth)  # Borders run between the centres of pixels.
         fades[..., region] = np.clip(0.5 + depth / widths[region], 0, 1) * (group_of == group)
     fades /= fades.sum(axis=2, keepdims=True)
-    outside = np.maximum(_distance_to(labels >= 0) - 0.5, 0)
-    fades *= np.clip(1 - outside / (OUTER_FADE * widths[0]), 0, 1)[..., None]
+    # Half of it within the outline: what examples of a turned head show outside is wall or hair.
+    depth = _distance_to(labels < 0) - _distance_to(labels >= 0)
+    depth -= 0.5 * np.sign(depth)
+    fades *= np.clip(0.5 + depth / widths[0], 0, 1)[..., None]
     return fades
 
 

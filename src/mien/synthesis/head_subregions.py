@@ -20,7 +20,8 @@ _PX_PER_MM = 2.0
 _MARGIN_MM = 10.0
 _FACING = 0.3
 """Of the normal towards the front: what turns away more is seen too flat to be drawn on."""
-_WHOLE = 0.999
+_OUTLINE = 0.5
+"""Of what a drawing holds of the face, as far as which it is drawn: there it fades in pictures."""
 _PARTS = {
     "left_eyeball": "left_eye",
     "right_eyeball": "right_eye",
@@ -66,7 +67,9 @@ def head_subregions() -> HeadSubregions:
     own = [name in _PARTS.values() for name in drawn.names]
     fades = _sampled(drawn.fades, places)
     fades[:, own] = 0
-    fades = _spread(generic, fades, _drawn_on(generic) & (fades.sum(axis=1) > _WHOLE))
+    total = fades.sum(axis=1, keepdims=True)
+    drawn_on = _drawn_on(generic) & (total[:, 0] > _OUTLINE)
+    fades = _spread(generic, fades / np.maximum(total, _OUTLINE), drawn_on)
     for part, name in _PARTS.items():
         fades[part_vertices(generic, part)] = np.array(drawn.names) == name
     swapped = [drawn.names.index(_other_side(name)) for name in drawn.names]
