@@ -28,8 +28,10 @@ __all__ = ["HeadSynthesis", "HeadSynthesizer"]
 LEAST_SHARE = 1e-3
 """Smaller shares of an example are none: they change no colour by a quarter of its step."""
 _NEAR_MM = 1e-6
-_USUAL = 0.5
-"""How far an expression or a unit is usually made, of the whole of it."""
+_EXPRESSION, _UNIT = 0.5, 0.2
+"""How far an expression and a unit are usually made, of the whole of it."""
+_SURE_MM = 0.3
+"""How well a point that is given is known: with more trust few points tell too much."""
 
 
 @dataclass(frozen=True)
@@ -160,13 +162,15 @@ class HeadSynthesizer:
         return turn
 
     def _learned(self) -> Inference:
-        moves = np.concatenate([self.examples[1:] - self.examples[0], self._units])
-        # As many rows as ways to move, and as many again the other way: their spread is `_USUAL`.
-        moves *= _USUAL * np.sqrt(max(len(moves), 1))
+        expressions = self.examples[1:] - self.examples[0]
+        moves = np.concatenate([_EXPRESSION * expressions, _UNIT * self._units])
+        # As many rows as ways to move, and as many again the other way: each spreads as it usually
+        # does, independently of the others.
+        moves *= np.sqrt(len(moves))
         statistics = np.concatenate([moves, -moves])
         if self._options.propagation == "printed":
             return Propagation(self.layout, statistics)
-        return ConditionalMotion(statistics, components=max(len(moves), 1))
+        return ConditionalMotion(statistics, components=max(len(moves), 1), least_noise=_SURE_MM)
 
 
 def _without_small(shares: Float[Array, "r k"]) -> Float[Array, "r k"]:
