@@ -102,11 +102,14 @@ def hull_note(examples: ExampleSet, hull_px: dict[str, float]) -> str | None:
     width = face_width(examples.layout, examples.neutral.points)
     beyond = sorted(hull_px.items(), key=lambda item: -item[1])
     told = [
-        f"{name.replace('_', ' ')} by {px:.1f} px ({px / width:.1%} of the face's width)"
+        f"{name.replace('_', ' ')} {px:.1f} px ({px / width:.1%})"
         for name, px in beyond
         if px > HULL_SHARE * width
     ]
-    return f"beyond what the examples show: {', '.join(told)}" if told else None
+    if not told:
+        return None
+    bound = f"more than {HULL_SHARE:.0%} of the face's width"
+    return f"beyond what the examples show, by {bound}: {', '.join(told)}"
 
 
 def _check_request(points: object, photo: object) -> None:
