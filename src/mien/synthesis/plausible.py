@@ -17,7 +17,8 @@ STRANGER = 0.8
 """The oddness from which points are likelier another person's, or of a head that is turned far.
 
 Learned from every other stretch of seven clips: 4 in 100 of the other frames reach it, those of
-another clip of the same person among them, and 2 in 100 pictures of fifteen others do not.
+another clip of the same person among them, and 2 or 3 in 100 pictures of fourteen others do
+not.
 """
 
 ENOUGH_STATISTICS = 20
