@@ -18,7 +18,7 @@ from mien.capture.photos import Photo
 from mien.errors import InputError
 from mien.synthesis.gather import ExamplePlan, Wishes, build_examples, lip_gaps, plan_examples
 
-OPEN = (0.0, 0.0, 6.0, 0.0, 4.0, 1.0)
+OPEN = (0.0, 0.0, 6.0, 0.0, 4.0, 0.1)
 """How far the lips of six pictures are apart, px of a face 100 wide."""
 RAISED = (0.0, 0.0, 0.0, 6.0, 0.0, 0.0)
 """How far the right brow goes up in them."""

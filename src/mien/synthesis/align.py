@@ -44,8 +44,12 @@ def warped(
     """
     import cv2
 
-    corners = points[triangles[np.maximum(raster.triangle_ids, 0)]]
-    places = np.einsum("yxk,yxkd->yxd", raster.barycentrics, corners).astype(np.float32) - 0.5
-    drawn: Array = cv2.remap(photo, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    drawn[~raster.mask] = 0
+    drawn = np.zeros((*raster.mask.shape, 3), np.uint8)
+    corners = points[triangles[raster.triangle_ids[raster.mask]]]
+    places = np.einsum("pk,pkd->pd", raster.barycentrics[raster.mask], corners)
+    # OpenCV counts from the first pixel's centre.
+    maps = np.full((*raster.mask.shape, 2), -1, np.float32)
+    maps[raster.mask] = places - 0.5
+    found = cv2.remap(photo, maps, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    drawn[raster.mask] = found[raster.mask]
     return drawn
