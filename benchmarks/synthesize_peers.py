@@ -1,0 +1,57 @@
+"""What others would do in place of synthesis, as far as they do it: to be timed beside mien."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+
+from mien.arrays import Array
+from mien.synthesis.examples import ExampleSet
+
+__all__ = ["mixed_by_numpy", "opencv_warp", "skimage_warp"]
+
+
+def opencv_warp(examples: ExampleSet, points: Array) -> Array:
+    """The usual loop: each triangle's box warped, and copied where the triangle is."""
+    layout, photo = examples.layout, examples.neutral.photo
+    height, width = photo.shape[:2]
+    frame = layout.frame(examples.neutral.points)
+    source = np.concatenate([examples.neutral.points, frame])
+    target = np.concatenate([points, frame])
+    out: Array = photo.copy()
+    for triangle in layout.triangles:
+        there, here = np.float32(source[triangle]), np.float32(target[triangle])
+        low = np.maximum(np.floor(here.min(0)).astype(int), 0)
+        high = np.minimum(np.ceil(here.max(0)).astype(int), [width, height])
+        if (high <= low).any():
+            continue
+        size = (int(high[0] - low[0]), int(high[1] - low[1]))
+        affine = cv2.getAffineTransform(there, np.float32(here - low))
+        warped = cv2.warpAffine(photo, affine, size, borderMode=cv2.BORDER_REPLICATE)
+        mask = np.zeros(size[::-1], np.uint8)
+        cv2.fillConvexPoly(mask, np.int32(np.round(here - low)), 1)
+        box = out[low[1] : high[1], low[0] : high[0]]
+        box[mask > 0] = warped[mask > 0]
+    return out
+
+
+def mixed_by_numpy(examples: ExampleSet, shares: Array) -> Callable[[int], object]:
+    """Eq. (6) and (7) over aligned images, without any warp."""
+    images = np.stack([example.photo for example in examples.examples]).astype(np.float32)
+    fades, weights = examples.subregions.fades, shares.astype(np.float32)
+    return lambda _: np.einsum("hwm,mhwc->hwc", fades @ weights, images).astype(np.uint8)
+
+
+def skimage_warp(examples: ExampleSet, points: Array) -> Callable[[int], object]:
+    """PiecewiseAffineTransform, estimated and applied. Raises: ImportError: it is not installed."""
+    transform = importlib.import_module("skimage.transform")
+    source, photo = examples.neutral.points, examples.neutral.photo
+
+    def warp(_: int) -> object:
+        motion = transform.PiecewiseAffineTransform.from_estimate(points, source)
+        return transform.warp(photo, motion)
+
+    return warp
