@@ -231,3 +231,32 @@ def test_statistics_that_are_no_archive(folder: Path) -> None:
     (folder / "statistics.npz").unlink()
     with pytest.raises(FileFormatError, match=r"statistics.npz: there is no such file"):
         load_examples(folder)
+
+
+def test_the_documented_way_to_read_it(
+    folder: Path, example_set: ExampleSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """docs/example-folder.md shows how to read the folder with numpy alone; it must be true."""
+    text = (Path(__file__).parents[2] / "docs" / "example-folder.md").read_text("utf-8")
+    code = text.split("```python\n")[1].split("```")[0]
+    folder.rename(folder.with_name("anna"))
+    monkeypatch.chdir(folder.parent)
+    found: dict[str, Any] = {}
+    exec(code, found)
+    np.testing.assert_array_equal(found["points"][1], example_set.examples[1].points)
+    expected = example_set.statistics - example_set.neutral.points
+    np.testing.assert_array_equal(found["displacements"], expected)
+
+
+def test_the_documented_keys_are_those_written(folder: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "example-folder.md").read_text("utf-8")
+    shown = json.loads(text.split("```json\n")[1].split("```")[0])
+    written = json.loads((folder / "examples.json").read_text())
+    assert list(shown) == list(written)
+    assert list(shown["examples"][0]) == list(written["examples"][0])
+    assert list(shown["layout"]) == list(written["layout"])
+
+
+def test_places_are_in_one_line(folder: Path) -> None:
+    text = (folder / "examples.json").read_text()
+    assert re.search(r'"chin": \[[\d.]+, [\d.]+\]', text)

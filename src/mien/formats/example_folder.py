@@ -1,8 +1,9 @@
-"""The example folder: what `mien examples` leaves, readable without mien (docs/examples.md)."""
+"""The example folder: what `mien examples` leaves (docs/example-folder.md)."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
@@ -44,6 +45,9 @@ __all__ = [
 
 INDEX, SUBREGIONS = "examples.json", "subregions.npz"
 
+_PAIR = re.compile(r"\[\n\s*([-+\d.e]+),\n\s*([-+\d.e]+)\n\s*\]")
+"""Two numbers, one a line: a place, which reads better in one line."""
+
 
 def write_examples(
     folder: str | Path, example_set: ExampleSet, *, why: Mapping[str, str] | None = None
@@ -78,7 +82,7 @@ def write_example_files(
         np.savez_compressed(folder / SUBREGIONS, **_subregion_arrays(example_set.subregions))
     np.savez_compressed(folder / STATISTICS, geometries=example_set.statistics)
     text = json.dumps(examples_to_json(example_set, why or {}), indent=1, allow_nan=False)
-    (folder / INDEX).write_text(text + "\n", encoding="utf-8")
+    (folder / INDEX).write_text(_PAIR.sub(r"[\1, \2]", text) + "\n", encoding="utf-8")
 
 
 def is_example_folder(folder: Path) -> bool:
