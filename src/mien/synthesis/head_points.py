@@ -10,8 +10,9 @@ import numpy as np
 from mien.arrays import Array, Float, frozen
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.generic import load_generic_head
-from mien.expressions.followers import Followers, part_vertices
+from mien.expressions.followers import part_vertices
 from mien.model.dense.surface import cotangent_laplacian
+from mien.synthesis.head_skin import inside_of_face, spread_over_skin
 
 __all__ = ["feature_points_on", "skin_with_points"]
 
@@ -39,8 +40,9 @@ def feature_points_on(vertices: Float[Array, "*batch v 3"]) -> Float[Array, "*ba
 def skin_with_points() -> Float[Array, "v n"]:
     """(V, n) by how much each vertex moves with each feature point; eyeballs and teeth do not.
 
-    The skin bends as little as it can; a movement of all points alike is one of the face. Lashes
-    and hair go along with the skin.
+    The skin bends as little as it can; a movement of all points alike is one of the face. What
+    lies behind lips and lids, and lashes and hair, go along with the skin next to them: bent as
+    little as the skin is, a socket would go on as its lid begins, and out through the cheek.
 
     Source: the thin plate on a mesh, L^T M^-1 L (Botsch and Kobbelt, 2004).
     """
@@ -56,9 +58,9 @@ def skin_with_points() -> Float[Array, "v n"]:
     factors: Any = splu(csc_array(bending + _HELD * csc_array(mixes.T @ mixes)))
     moved = np.zeros((len(mesh.vertices), len(mixes)))
     moved[skin] = factors.solve(_HELD * mixes.T)
-    followers = Followers.of(generic)
-    moved[followers.vertices] = followers.carried(moved)
-    return frozen(moved)
+    outside = np.zeros(len(moved), bool)
+    outside[skin] = True
+    return frozen(spread_over_skin(moved, outside & ~inside_of_face()))
 
 
 def _mixes_of_vertices() -> Float[Array, "n v"]:

@@ -11,8 +11,9 @@ from mien.arrays import Array, Bool, Float, Int, frozen
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.assets.subregions import default_subregions
-from mien.expressions.followers import Followers, part_vertices
+from mien.expressions.followers import part_vertices
 from mien.synthesis.head_points import feature_points_on
+from mien.synthesis.head_skin import inside_of_face, spread_over_skin
 
 __all__ = ["HeadSubregions", "head_subregions"]
 
@@ -69,7 +70,7 @@ def head_subregions() -> HeadSubregions:
     fades[:, own] = 0
     total = fades.sum(axis=1, keepdims=True)
     drawn_on = _drawn_on(generic) & (total[:, 0] > _OUTLINE)
-    fades = _spread(generic, fades / np.maximum(total, _OUTLINE), drawn_on)
+    fades = spread_over_skin(fades / np.maximum(total, _OUTLINE), drawn_on)
     for part, name in _PARTS.items():
         fades[part_vertices(generic, part)] = np.array(drawn.names) == name
     swapped = [drawn.names.index(_other_side(name)) for name in drawn.names]
@@ -89,34 +90,10 @@ def _sampled(fades: Float[Array, "h w r"], places: Float[Array, "v 2"]) -> Float
 
 def _drawn_on(generic: GenericHead) -> Bool[Array, " v"]:
     """Skin that faces the front and lies behind nothing."""
-    inside = np.maximum(generic.regions["mouth_cavity"], generic.regions["eye_socket"])
-    facing: Array = (generic.mesh.vertex_normals()[:, 2] > _FACING) & (inside < 0.5)
-    skin = np.zeros(len(inside), bool)
+    facing: Array = (generic.mesh.vertex_normals()[:, 2] > _FACING) & ~inside_of_face()
+    skin = np.zeros(len(facing), bool)
     skin[part_vertices(generic, "skin")] = True
     return facing & skin
-
-
-def _spread(
-    generic: GenericHead, fades: Float[Array, "v r"], known: Bool[Array, " v"]
-) -> Float[Array, "v r"]:
-    """Other skin is the mean of its neighbours; lashes and hair are as the skin next to them."""
-    from scipy.sparse import coo_array, diags_array
-    from scipy.sparse.linalg import spsolve
-
-    vertices, skin = generic.mesh.vertices, part_vertices(generic, "skin")
-    triangles = generic.mesh.triangles[generic.mesh.triangles_of("skin")]
-    ends = np.vstack([triangles[:, [a, b]] for a in range(3) for b in range(3) if a != b])
-    ends = np.unique(ends, axis=0)
-    shape = (len(vertices), len(vertices))
-    joined = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=shape).tocsr()
-    apart = (diags_array(joined.sum(axis=1)) - joined).tocsr()
-    unknown = np.setdiff1d(skin, np.flatnonzero(known))
-    spread = np.array(fades, np.float64)
-    towards = apart[unknown][:, np.flatnonzero(known)] @ spread[known]
-    spread[unknown] = spsolve(apart[unknown][:, unknown].tocsc(), -towards)
-    followers = Followers.of(generic)
-    spread[followers.vertices] = followers.carried(spread)
-    return spread
 
 
 def _other_side(name: str) -> str:
