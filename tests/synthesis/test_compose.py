@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numba
 import numpy as np
 import pytest
@@ -223,6 +225,39 @@ def test_points_that_leave_the_frame_are_no_harm(noisy):
     points = noisy.neutral.points + np.array([WIDTH, 0.6 * HEIGHT])
     image = Composer(noisy).render(points, shares(noisy, [0, 0, 1, 0]))
     np.testing.assert_array_equal(image[:20, :20], noisy.neutral.photo[:20, :20])
+
+
+def test_points_as_far_as_numbers_go_are_no_harm(noisy):
+    points = np.array(noisy.neutral.points)
+    points[::7] += 1e12
+    points[::5] -= 1e300
+    composer, coefficients = Composer(noisy), shares(noisy, [0.5, 0.5, 0, 0])
+    composer.render(points, coefficients, size=(33, 1))
+    assert composer.render(points, coefficients).shape == noisy.neutral.photo.shape
+
+
+def test_photos_may_differ_in_size(layout):
+    """The second one shows the same at half the size: it gives the same picture, blurred."""
+    picture = painted(centres())
+    small = painted(2 * centres()[: HEIGHT // 2, : WIDTH // 2])
+    example_set = made(layout, [rounded(picture), rounded(small)])
+    neutral, half = example_set.examples
+    half = Example(half.name, half.photo, neutral.points / 2, "")
+    example_set = replace(example_set, examples=(neutral, half))
+    image = Composer(example_set).render(neutral.points, shares(example_set, [0, 1]))
+    inside = core(example_set)
+    assert psnr(image[inside], picture[inside]) > 35
+
+
+def test_shares_below_zero_are_taken_away(layout):
+    colours = [(10, 200, 30), (50, 100, 90)]
+    photos = [np.full((HEIGHT, WIDTH, 3), colour, np.uint8) for colour in colours]
+    example_set = made(layout, photos)
+    row = np.array([1.25, -0.25])
+    image = Composer(example_set).render(example_set.neutral.points, shares(example_set, row))
+    inside = image[core(example_set)]
+    expected = rounded(np.clip(row @ np.array(colours), 0, 255))
+    np.testing.assert_array_equal(inside, np.broadcast_to(expected, inside.shape))
 
 
 def test_bad_input_is_named(noisy):
