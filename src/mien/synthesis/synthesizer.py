@@ -185,7 +185,7 @@ class Synthesizer:
         geometries, _ = compensated(self.examples.statistics, neutral, by=by)
         if self.options.propagation == "printed":
             return Propagation(self.examples.layout, geometries - neutral)
-        return ConditionalMotion(geometries - neutral)
+        return ConditionalMotion(geometries - neutral, places=self.examples.layout.template)
 
 
 def _checked(value: str, choices: object, name: str) -> str:
