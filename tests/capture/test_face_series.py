@@ -104,6 +104,12 @@ def test_sources_that_are_none(tmp_path: Path, detector: LandmarkDetector) -> No
         find_faces(tmp_path / "a.mp4", detector, max_side=400)
 
 
+def test_a_face_of_a_video_cannot_be_chosen(tmp_path: Path, detector: LandmarkDetector) -> None:
+    clip = written(tmp_path / "a.mp4", grey([10, 20]))
+    with pytest.raises(InputError, match=r"--face: expected photos to choose a face in, got a vid"):
+        find_faces(clip, detector, max_side=400, face=1)
+
+
 def made_up(*, video: bool) -> FaceSeries:
     numbers = np.array([0, 12, 40])
     names = [f"frame_{n:06d}.png" for n in numbers] if video else ["12.jpg", "a.jpg", "b.jpg"]

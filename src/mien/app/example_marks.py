@@ -17,7 +17,7 @@ from mien.capture.photos import Photo
 from mien.formats.points_file import read_points
 from mien.formats.strict_json import read_json
 
-__all__ = ["points_of", "read_marks", "with_marks"]
+__all__ = ["mark_files", "points_of", "read_marks", "with_marks"]
 
 OF_HEADS = tuple(
     [f"{side}_{part}" for side in ("right", "left") for part in ("eye_outer", "eye_inner")]
@@ -40,20 +40,28 @@ def read_marks(file: Path, photo: Photo, layout: FeatureLayout) -> dict[str, Flo
 
     Raises: FileFormatError: one of them is damaged or holds other points; says where.
     """
-    annotations = file.parent / ANNOTATIONS / f"{file.stem}.json"
-    sources = [file.with_suffix(".tem"), file.with_suffix(".pts")]
-    for_heads = annotations.is_file() and "layout" not in read_json(annotations)
-    if not for_heads:
-        sources.append(annotations)
+    sources = mark_files(file)
+    for_heads = [path for path in sources if _is_for_heads(path)]
     found: dict[str, Array] = {}
-    for path in filter(Path.is_file, sources):
+    for path in (path for path in sources if path not in for_heads):
         rows, places = read_points(path, layout)
         found |= {layout.names[r]: at * photo.scale for r, at in zip(rows, places, strict=True)}
-    if for_heads:
+    for path in for_heads:
         names = AnnotationNames.of(load_generic_head())
-        points = load_annotations(annotations, photo, names=names).points
+        points = load_annotations(path, photo, names=names).points
         found |= {n: points[n] for n in OF_HEADS if n in points and n in layout.names}
     return found
+
+
+def mark_files(file: Path) -> list[Path]:
+    """Where a photo's marks are, those that count most last."""
+    annotations = file.parent / ANNOTATIONS / f"{file.stem}.json"
+    places = (file.with_suffix(".tem"), file.with_suffix(".pts"), annotations)
+    return [path for path in places if path.is_file()]
+
+
+def _is_for_heads(path: Path) -> bool:
+    return path.suffix == ".json" and "layout" not in read_json(path)
 
 
 def with_marks(

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mien.app.example_marks import points_of, read_marks
+from mien.app.example_marks import Marks, mark_files, points_of, read_marks
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.detector import LandmarkDetector
 from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of, rows_of
@@ -167,16 +167,16 @@ def gather_examples(
     return GatheredExamples(examples, why, tuple(sorted(pictures.items())), tuple(notes))
 
 
-def _marks(series: FaceSeries, layout: FeatureLayout) -> dict[int, dict]:
-    found = {}
+def _marks(series: FaceSeries, layout: FeatureLayout) -> dict[int, Marks]:
+    """Hand-made marks, by row, where there are any."""
+    found: dict[int, Marks] = {}
     for row, file in enumerate(series.files):
-        photo = load_photo(file, max_side=series.max_side)
-        if marks := read_marks(file, photo, layout):
-            found[row] = marks
+        if mark_files(file):
+            found[row] = read_marks(file, load_photo(file, max_side=series.max_side), layout)
     return found
 
 
-def _notes(plan: ExamplePlan, series: FaceSeries, marks: dict[int, dict]) -> list[str]:
+def _notes(plan: ExamplePlan, series: FaceSeries, marks: dict[int, Marks]) -> list[str]:
     """How many pictures were what, and what is missing."""
     notes = [
         f"{series.names[row]}: {len(found)} points marked by hand" for row, found in marks.items()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +40,7 @@ class FaceSeries:
         files: of a folder, each picture's file; of a video, empty.
         names: of the pictures: `frame_000123.png`, `smile.jpg`, or `joy/smile.jpg` in a folder of
             one folder an expression.
-        landmarks: (N, 478, 2) px of the picture as `load_pictures` gives it.
+        landmarks: (N, 478, 2) float32, px of the picture as `load_pictures` gives it.
         sizes: (N, 2) their widths and heights, px.
         scores: of the same; `index` counts frames or photos from 0.
         seconds: of a video's frames, since its beginning.
@@ -79,14 +79,16 @@ def find_faces(
 
     Args:
         max_side: px; larger pictures are reduced to it.
-        face: as for LandmarkDetector.detect, of photos; a video's is its largest.
+        face: as for LandmarkDetector.detect, of photos; a video's is the largest.
         look: called with each picture that shows the face, as long as its pixels are there.
-    Raises: InputError, FileFormatError: no such source, damaged, not a video, no photo in it.
-        EstimationError: no picture shows a face.
+    Raises: InputError, FileFormatError: no such source, damaged, not a video, no photo in it; a
+        `face` of a video. EstimationError: no picture shows a face.
     """
     source = Path(source)
     gathered = _Gathered(source, max_side, look or (lambda pixels, landmarks: None))
     if source.is_file() and source.suffix.lower() in VIDEO_SUFFIXES:
+        if face is not None:
+            raise InputError("--face", "photos to choose a face in", f"a video, {source.name}")
         gathered.read_video(detector, report)
     else:
         gathered.read_photos(detector, face, report)
@@ -122,7 +124,6 @@ class _Gathered:
         self.is_video = False
         self.files: list[Path] = []
         self.names: list[str] = []
-        self.landmarks: list[Array] = []
         self.sizes: list[tuple[int, int]] = []
         self.seconds: list[float] = []
         self.rows: list[tuple[int, float, DetectedFace]] = []
@@ -182,8 +183,9 @@ class _Gathered:
     ) -> None:
         points = found.points[:, :2]
         self.names.append(name)
-        self.landmarks.append(points)
         self.sizes.append((pixels.shape[1], pixels.shape[0]))
+        # Of long videos nothing is kept that is not needed.
+        found = replace(found, points=found.points.astype(np.float32))
         self.rows.append((number, face_sharpness(pixels, points), found))
         self.look(pixels, points)
 
@@ -199,7 +201,7 @@ class _Gathered:
             self.is_video,
             tuple(self.files),
             tuple(self.names),
-            np.stack(self.landmarks),
+            np.stack([found.points[:, :2] for _, _, found in self.rows]),
             np.array(self.sizes),
             FrameScores.of(*zip(*self.rows, strict=True)),
             np.array(self.seconds) if self.is_video else None,
