@@ -100,6 +100,19 @@ def test_the_face_of_a_photo(
     assert 0.1 < off.mean() < 8
 
 
+def test_a_face_that_does_not_look_like_the_head_is_told_of(
+    mien: Mien, expressive: Path, bare_james: Path, tmp_path: Path
+) -> None:
+    """James from above, light and dark exchanged."""
+    pixels = 255 - load_image(bare_james / "left.png") // 2
+    Image.fromarray(pixels).save(tmp_path / "other.png")
+    ran = mien(
+        "synthesize", expressive, "-o", tmp_path / "o.png", "--photo", tmp_path / "other.png"
+    )
+    assert ran.status == 0
+    assert "note: other.png: the face does not look like the head's" in ran.err
+
+
 def test_a_photo_without_a_face(mien: Mien, expressive: Path, wall: Array, tmp_path: Path) -> None:
     Image.fromarray(wall).save(tmp_path / "wall.png")
     asking = ("synthesize", expressive, "-o", tmp_path / "o.png", "--json")

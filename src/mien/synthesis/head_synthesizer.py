@@ -101,8 +101,7 @@ class HeadSynthesizer:
             known: indices of points, none twice.
             positions: (k, 3) mm, head space.
         Returns: (n, 3) mm; the known points exactly where they were given.
-        Raises: InputError: no points, unknown or repeated ones, shapes, NaN; a head that has
-            neither units nor expressions but neutral.
+        Raises: InputError: no points, unknown or repeated ones, shapes, NaN.
         Source: Z06 section 10.
         """
         neutral = self.examples[0]
@@ -170,7 +169,7 @@ class HeadSynthesizer:
         statistics = np.concatenate([moves, -moves])
         if self._options.propagation == "printed":
             return Propagation(self.layout, statistics)
-        return ConditionalMotion(statistics, components=max(len(moves), 1), least_noise=_SURE_MM)
+        return ConditionalMotion(statistics, components=len(moves), least_noise=_SURE_MM)
 
 
 def _without_small(shares: Float[Array, "r k"]) -> Float[Array, "r k"]:
