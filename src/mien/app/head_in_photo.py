@@ -66,8 +66,8 @@ def find_head(head: Head, photo: Photo) -> HeadInPhoto:
             reduced = pixels.shape[1] / width
             state = ready.starter.find(pixels, focal_px=focal * reduced)
             notes = (
-                f"{photo.name}: the face does not look like the head's: another person's, or in other "
-                "light; its points come from landmarks alone",
+                f"{photo.name}: the face does not look like the head's: another person's, or in "
+                "other light; its points come from landmarks alone",
             )
     if state is None:
         raise EstimationError(f"{photo.name}: no face found that fits the head")
