@@ -11,6 +11,7 @@ from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import Subregions, default_subregions
 from mien.errors import InputError
 from mien.synthesis.coefficients import (
+    BROWS,
     UPPER_FACE,
     coefficients,
     coefficients_of,
@@ -151,7 +152,50 @@ def test_bad_groups(example_set, together, message):
 def test_the_upper_face_is_of_the_subregions_that_ship():
     layout = load_feature_layout()
     drawn = default_subregions(layout, 100 + 200 * layout.template, (320, 400))
-    assert set(UPPER_FACE) < set(drawn.names)
+    assert set(BROWS) < set(UPPER_FACE) < set(drawn.names)
+
+
+def test_the_brows_go_together_unless_told_otherwise(example_set, rng):
+    names = (*BROWS, "nose")
+    members = np.array_split(np.arange(len(example_set.layout.names)), len(names))
+    parted = replace(
+        example_set,
+        subregions=Subregions(names, np.full((30, 20, 4), 0.25, np.float32), tuple(members)),
+    )
+    points = example_set.neutral.points + 9 * rng.normal(size=example_set.neutral.points.shape)
+    shares = coefficients(parted, points)
+    np.testing.assert_array_equal(shares, coefficients(parted, points, together=[BROWS]))
+    assert (shares[:3] == shares[0]).all()
+    assert np.abs(shares[3] - shares[0]).max() > 0.1
+    assert np.abs(np.diff(coefficients(parted, points, together=())[:3], axis=0)).max() > 0.1
+
+
+@pytest.fixture(scope="module")
+def with_teeth(example_set):
+    """The same, the second subregion the teeth, which examples 1 and 3 show."""
+    named = replace(example_set.subregions, names=("skin", "teeth"))
+    return replace(example_set, subregions=named, teeth=(1, 3))
+
+
+def test_teeth_are_made_from_those_that_show_teeth(with_teeth):
+    geometries = with_teeth.geometries
+    points = 0.6 * geometries[1] + 0.2 * geometries[3] + 0.2 * geometries[4]
+    skin, teeth = coefficients(with_teeth, points)
+    assert skin[4] > 0.1
+    assert teeth[[0, 2, 4]].max() == 0
+    assert teeth.min() >= 0
+    assert teeth.sum() == pytest.approx(1)
+
+
+def test_a_shut_mouth_is_made_from_shut_mouths(with_teeth):
+    shares = coefficients(with_teeth, with_teeth.examples[2].points)
+    np.testing.assert_allclose(shares, np.tile(np.eye(5)[2], (2, 1)), atol=1e-5)
+
+
+def test_teeth_that_are_together_with_others_are_made_from_all(with_teeth):
+    points = 0.6 * with_teeth.geometries[1] + 0.4 * with_teeth.geometries[4]
+    shares = coefficients(with_teeth, points, together=[("skin", "teeth")])
+    assert shares[1, 4] > 0.1
 
 
 def test_geometries_in_space_are_mixed_likewise(example_set, rng):

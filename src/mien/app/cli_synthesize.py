@@ -58,7 +58,7 @@ def synthesize(
     ] = None,
     distance_penalty: Annotated[
         float | None,
-        typer.Option(help="Prefer examples that are near: 0.02 by default, Z06 has 0."),
+        typer.Option(help="Prefer examples that are near: 0.05 by default, Z06 has 0."),
     ] = None,
     slack: Annotated[
         float | None,

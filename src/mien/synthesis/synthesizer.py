@@ -11,7 +11,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8, check_array, frozen
 from mien.errors import InputError
-from mien.synthesis.coefficients import coefficients, distances_of
+from mien.synthesis.coefficients import DISTANCE_PENALTY, coefficients, distances_of
 from mien.synthesis.compose import Composer
 from mien.synthesis.conditional import ConditionalMotion
 from mien.synthesis.examples import ExampleSet
@@ -48,9 +48,9 @@ class SynthesisOptions:
     Raises: InputError: another name of a propagation, a penalty or slack that is no number from 0.
     """
 
-    distance_penalty: float = 0.02
+    distance_penalty: float = DISTANCE_PENALTY
     slack: float = 0.0
-    together: Sequence[Collection[str]] = ()
+    together: Sequence[Collection[str]] | None = None
     propagation: PropagationName = "closed-form"
 
     def __post_init__(self) -> None:
