@@ -128,7 +128,7 @@ class HeadSynthesizer:
             self.subregions,
             distance_penalty=options.distance_penalty,
             slack=options.slack,
-            together=options.together,
+            together=options.together or (),
         )
         shares = _without_small(shares)
         # In this order, subregions that agree leave no trace of their borders.
