@@ -179,9 +179,9 @@ def with_teeth(example_set):
 
 def test_teeth_are_made_from_those_that_show_teeth(with_teeth):
     geometries = with_teeth.geometries
-    points = 0.6 * geometries[1] + 0.2 * geometries[3] + 0.2 * geometries[4]
+    points = 0.85 * geometries[1] + 0.05 * geometries[3] + 0.1 * geometries[4]
     skin, teeth = coefficients(with_teeth, points)
-    assert skin[4] > 0.1
+    assert skin[4] > 0.05
     assert teeth[[0, 2, 4]].max() == 0
     assert teeth.min() >= 0
     assert teeth.sum() == pytest.approx(1)
@@ -190,6 +190,14 @@ def test_teeth_are_made_from_those_that_show_teeth(with_teeth):
 def test_a_shut_mouth_is_made_from_shut_mouths(with_teeth):
     shares = coefficients(with_teeth, with_teeth.examples[2].points)
     np.testing.assert_allclose(shares, np.tile(np.eye(5)[2], (2, 1)), atol=1e-5)
+
+
+def test_a_mouth_that_opens_gets_its_teeth_without_a_jump(with_teeth):
+    shut, wide = with_teeth.geometries[2], with_teeth.geometries[1]
+    places = shut + np.linspace(0, 1, 401)[:, None, None] * (wide - shut)
+    found = np.array([coefficients(with_teeth, place)[1] for place in places])
+    np.testing.assert_allclose(found[[0, -1]], np.eye(5)[[2, 1]], atol=1e-5)
+    assert np.abs(np.diff(found, axis=0)).sum(axis=1).max() < 0.05
 
 
 def test_teeth_that_are_together_with_others_are_made_from_all(with_teeth):

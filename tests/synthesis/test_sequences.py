@@ -104,13 +104,15 @@ def test_a_sequence_steps_no_farther_than_its_geometry(who, most, options, reque
     assert finer_per_px.max() < most * np.median(finer_per_px)
 
 
+@pytest.mark.parametrize("teeth", [(), (2, 5, 7)])
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
-def test_shares_do_not_jump(person, options):
+def test_shares_do_not_jump(person, options, teeth):
     """Where they change fastest, nearer and nearer places have nearer and nearer shares."""
-    example_set, keys = person
+    example_set, keys = replace(person[0], teeth=teeth), person[1]
 
     def shares(place):
-        return coefficients(example_set, place, distance_penalty=options.distance_penalty)
+        together, penalty = options.together, options.distance_penalty
+        return coefficients(example_set, place, distance_penalty=penalty, together=together)
 
     places = path_of(keys, STEPS)
     found = [shares(place) for place in places]

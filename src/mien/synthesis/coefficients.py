@@ -100,8 +100,9 @@ def coefficients_of(
         apart: (m, n, d) the examples' geometries relative to the one asked for.
         subregions: whose members are some of the n points.
         distance_penalty, slack, together: as for `coefficients`.
-        only: the examples that a subregion is made from where the nearest is among them: teeth
-            from those that show teeth, unless the mouth is shut. Not of those together with others.
+        only: the examples that a subregion is made from where they are near: teeth from those that
+            show teeth, unless the mouth is shut. In between it is made from both, so that a mouth
+            that opens does so without a jump. Not of those together with others.
     Raises: InputError: as `coefficients`.
     Source: Z06 section 6, eq. (2) to (5), section 9.
     """
@@ -118,11 +119,24 @@ def coefficients_of(
         offsets = apart[:, members].reshape(len(apart), -1)
         products = offsets @ offsets.T
         used = (only or {}).get(subregions.names[rows[0]], ()) if len(rows) == 1 else ()
-        if used and products.diagonal().argmin() in used:
-            shares[rows[0], used] = _mixture(products[np.ix_(used, used)], distance_penalty, slack)
-        else:
-            shares[rows] = _mixture(products, distance_penalty, slack)
+        part = _share_of(products.diagonal(), used)
+        if part > 0:
+            few = _mixture(products[np.ix_(used, used)], distance_penalty, slack)
+            shares[rows[0], used] = part * few
+        if part < 1:
+            shares[rows] += (1 - part) * _mixture(products, distance_penalty, slack)
     return shares
+
+
+def _share_of(squares: Float[Array, " m"], used: Sequence[int]) -> float:
+    """How much of a subregion some examples make alone: all where they are three times as near."""
+    if not used:
+        return 0.0
+    others = np.delete(squares, used)
+    if not others.size:
+        return 1.0
+    near, far = squares[list(used)].min(), others.min()
+    return float(np.clip(0.5 + (far - near) / max(far + near, 1e-300), 0, 1))
 
 
 def _mixture(products: Float[Array, "m m"], distance_penalty: float, slack: float) -> Array:
