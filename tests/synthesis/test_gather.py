@@ -169,3 +169,22 @@ def test_photos_of_one_name_in_two_folders(layout: FeatureLayout, points: Array)
 
 def test_gaps_of_lips(layout: FeatureLayout, points: Array) -> None:
     np.testing.assert_allclose(lip_gaps(layout, points), OPEN)
+
+
+def test_better_points_of_the_examples_make_all_geometries_of_their_kind(
+    layout: FeatureLayout, points: Array
+) -> None:
+    """A detector that has every brow 2 px too low: known from the examples, undone in all."""
+    shift = np.zeros_like(points[0])
+    brows = [index for index, name in enumerate(layout.names) if "_brow_" in name]
+    shift[brows, 1] = -2.0
+    plan = plan_examples(layout, series_of(), points)
+    better = {row: points[row] + shift for row in chosen(plan)}
+    moved = plan.with_points(better)
+    truth = plan_examples(layout, series_of(), points + shift)
+    np.testing.assert_allclose(moved.points[chosen(plan)], list(better.values()))
+    np.testing.assert_allclose(moved.geometries, truth.geometries, atol=0.05)
+    assert np.abs(plan.geometries - truth.geometries).max() > 1
+    built, _ = build_examples(moved, photos_of(plan), even=False)
+    np.testing.assert_allclose(built.neutral.points, points[chosen(plan)[0]] + shift)
+    np.testing.assert_allclose(built.statistics, moved.statistics)

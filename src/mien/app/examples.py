@@ -5,17 +5,18 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mien.app.example_marks import Marks, mark_files, points_of, read_marks
+from mien.app.example_marks import Marks, mark_files, points_of, read_marks, with_marks
+from mien.arrays import Array, Float
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.detector import LandmarkDetector
 from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of, rows_of
-from mien.capture.photos import load_photo
+from mien.capture.photos import Photo, load_photo
 from mien.formats.atomic import atomic_folder
 from mien.formats.example_folder import (
     check_example_place,
@@ -27,12 +28,14 @@ from mien.report.example_sheet import example_sheet
 from mien.synthesis.covered import LipColours
 from mien.synthesis.examples import ExampleSet
 from mien.synthesis.gather import COUNT, ExamplePlan, Wishes, build_examples, plan_examples
+from mien.synthesis.steady import steady_points
 from mien.synthesis.unfit import COVERED, CUT, unfit_reasons
 
 if TYPE_CHECKING:
     from mien.build import Progress
 
-FINDING, FETCHING, WRITING = "Finding the face", "Fetching the examples", "Writing"
+FINDING, FETCHING = "Finding the face", "Fetching the examples"
+LOOKING, WRITING = "Looking at them again", "Writing"
 COUNTED = (FINDING,)
 """Stages whose steps are pictures."""
 MAX_SIDE = 1200
@@ -152,6 +155,7 @@ def gather_examples(
     plan = plan_examples(layout, series, points, wishes=wishes, unfit=unfit, count=request.count)
     rows = plan.choice.rows.tolist()
     photos = dict(load_pictures(series, rows, partial(tell, FETCHING)))
+    plan = plan.with_points(_steady(series, layout, photos, marks, partial(tell, LOOKING)))
     video = series.source.name if series.is_video else ""
     examples, why = build_examples(plan, photos, source=video, even=request.even)
     pictures = dict(zip(plan.names, plan.choice.reasons, strict=True)) | series.left_out
@@ -165,6 +169,23 @@ def gather_examples(
     if len(rows) == 1:
         notes.append("one example alone shows no expression but its own")
     return GatheredExamples(examples, why, tuple(sorted(pictures.items())), tuple(notes))
+
+
+def _steady(
+    series: FaceSeries,
+    layout: FeatureLayout,
+    photos: Mapping[int, Photo],
+    marks: Mapping[int, Marks],
+    report: Callable[[int, int], None],
+) -> dict[int, Float[Array, "n 2"]]:
+    """The examples' points from several looks at each, by row; marks win."""
+    found = {}
+    with LandmarkDetector() as detector:
+        for number, (row, photo) in enumerate(photos.items()):
+            points = steady_points(layout, detector, photo.pixels, series.landmarks[row])
+            found[row] = with_marks(layout, points, marks.get(row, {}))
+            report(number + 1, len(photos))
+    return found
 
 
 def _marks(series: FaceSeries, layout: FeatureLayout) -> dict[int, Marks]:

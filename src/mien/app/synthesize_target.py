@@ -15,6 +15,7 @@ from mien.errors import InputError
 from mien.formats.points_file import read_points
 from mien.synthesis.motion import PlanarMotion
 from mien.synthesis.plausible import STRANGER, face_width, head_moved, look_mirrored, oddness
+from mien.synthesis.steady import steady_points
 from mien.synthesis.synthesizer import LEAST_TELLING, Synthesizer
 
 __all__ = ["HeadChoice", "Target", "target_from_photo", "target_from_points"]
@@ -92,7 +93,8 @@ def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int |
     photo = load_photo(path)
     with LandmarkDetector() as detector:
         landmarks = detector.detect(photo, face=face)
-    detected = layout.from_landmarks(landmarks.points)
+        # As the examples' points are found: see there.
+        detected = steady_points(layout, detector, photo.pixels, landmarks.points)
     points = with_marks(layout, detected, read_marks(Path(path), photo, layout))
     motion = synthesizer.head_motion(points)
     notes = [*photo.notes, *landmarks.notes, *_stranger_notes(synthesizer, path, points)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import PurePosixPath
 
 import numpy as np
@@ -84,6 +84,23 @@ class ExamplePlan:
         thin = np.unique(np.rint(np.linspace(0, len(rows) - 1, MOST_STATISTICS)).astype(int))
         found: Array = self.geometries[rows[thin] if len(rows) > MOST_STATISTICS else rows]
         return found
+
+    def with_points(self, points: Mapping[int, Float[Array, "n 2"]]) -> ExamplePlan:
+        """The same with better points in some pictures, the examples' among them.
+
+        What points of these were off by in the mean, those of all others are taken to be off by.
+
+        Args:
+            points: by row, px of the picture.
+        """
+        rows, better = list(points), self.points.copy()
+        better[rows] = list(points.values())
+        neutral = better[self.choice.rows[0]]
+        geometries, _ = compensated(better, neutral)
+        before, _ = compensated(self.points[rows], neutral)
+        others = np.setdiff1d(np.arange(len(better)), rows)
+        geometries[others] += (geometries[rows] - before).mean(axis=0)
+        return replace(self, points=better, geometries=geometries)
 
 
 def plan_examples(
