@@ -8,37 +8,37 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from benchmarks.expression_quality_clips import (
     FilmedFace,
     Likeness,
-    examples_of,
+    chosen_rows,
+    example_set,
     face_mask,
     filmed,
     held_out,
     likeness,
+    steadied,
 )
-from benchmarks.table import markdown_table, write_results
+from benchmarks.expression_quality_report import MIEN, NEAREST, NEUTRAL, Found, Report
+from benchmarks.table import write_results
 from benchmarks.track_clips import CLIPS
 from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import load_feature_layout
 from mien.capture.detector import LandmarkDetector
 from mien.formats.image import save_image
-from mien.synthesis.coefficients import UPPER_FACE, coefficients
+from mien.synthesis.coefficients import BROWS, UPPER_FACE, coefficients
 from mien.synthesis.compose import Composer
 from mien.synthesis.examples import ExampleSet
 
 Shares = Callable[[ExampleSet, Array], Array]
 """A set and points, px: each subregion's shares of its examples."""
 
-Found = Mapping[str, Float[Array, "f 3"]]
-"""By way: PSNR, SSIM and detail of each frame."""
-
-NEUTRAL, NEAREST, MIEN = "neutral, warped", "nearest example, warped", "synthesised"
 SHEET_ROWS = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Frames of a sheet: which share of all gain less."""
 EXAMPLES = {"d6": 60}
@@ -46,7 +46,7 @@ EXAMPLES = {"d6": 60}
 SHIPPED = ("cap12", "cap13")
 """Clips whose pictures may be shown (data/README.md of the development data)."""
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-_GAP, _MARGIN = 4, 0.12
+_GAP, _MARGIN, _SMALL = 4, 0.12, 200
 
 
 def neutral_alone(examples: ExampleSet, points: Array) -> Array:
@@ -66,6 +66,11 @@ def _one(examples: ExampleSet, row: int) -> Array:
     return shares
 
 
+def _with(**options: Any) -> Shares:
+    return lambda examples, points: coefficients(examples, points, **options)
+
+
+EYES = tuple(name for name in UPPER_FACE if name not in BROWS)
 COMPARED: Mapping[str, Shares] = {
     NEUTRAL: neutral_alone,
     NEAREST: nearest_alone,
@@ -73,15 +78,24 @@ COMPARED: Mapping[str, Shares] = {
 }
 SWITCHES: Mapping[str, Shares] = {
     "as mien does it by default": coefficients,
-    "the paper's: no penalty, each subregion for itself": lambda s, p: coefficients(
-        s, p, distance_penalty=0.0, together=()
-    ),
-    "penalty 0.1": lambda s, p: coefficients(s, p, distance_penalty=0.1),
-    "penalty 0.3": lambda s, p: coefficients(s, p, distance_penalty=0.3),
-    "upper face together": lambda s, p: coefficients(s, p, together=[UPPER_FACE]),
-    "shares down to -0.01": lambda s, p: coefficients(s, p, slack=0.01),
-    "shares down to -0.05": lambda s, p: coefficients(s, p, slack=0.05),
+    "the paper's: no penalty, each subregion for itself": _with(distance_penalty=0.0, together=()),
+    "penalty 0.02": _with(distance_penalty=0.02),
+    "penalty 0.2": _with(distance_penalty=0.2),
+    "each subregion for itself": _with(together=()),
+    "brows together, and eyes with lids": _with(together=(BROWS, EYES)),
+    "upper face together": _with(together=(UPPER_FACE,)),
+    "teeth from all examples": lambda s, p: coefficients(replace(s, teeth=()), p),
+    "shares down to -0.01": _with(slack=0.01),
+    "shares down to -0.05": _with(slack=0.05),
 }
+SINGLE = "points from a single look at each frame"
+
+
+class Size(NamedTuple):
+    """How many examples, at most, and held-out frames."""
+
+    examples: int
+    frames: int
 
 
 @dataclass(frozen=True)
@@ -117,11 +131,19 @@ class Trial:
         return _joined(lines, axis=0)
 
 
-def trial(face: FilmedFace, *, examples: int, frames: int, odd: bool = True) -> Trial:
-    """Examples from every other stretch of a clip, held-out frames from the stretches between."""
-    chosen = examples_of(face, examples, odd=odd)
-    rows = tuple(held_out(face, frames, odd=odd))
-    return Trial(face, rows, chosen, Composer(chosen))
+def trial(face: FilmedFace, detector: LandmarkDetector | None, size: Size, *, odd: bool) -> Trial:
+    """Examples from every other stretch of a clip, held-out frames from the stretches between.
+
+    Args:
+        detector: looks several times at each of these frames; none: the single look stays.
+        odd: examples from the odd stretches.
+    """
+    chosen = chosen_rows(face, size.examples, odd=odd)
+    rows = tuple(held_out(face, size.frames, odd=odd))
+    if detector is not None:
+        face = steadied(face, [*chosen, *rows], detector)
+    examples = example_set(face, chosen)
+    return Trial(face, rows, examples, Composer(examples))
 
 
 def _window(face: FilmedFace, row: int) -> tuple[slice, slice]:
@@ -136,7 +158,13 @@ def _window(face: FilmedFace, row: int) -> tuple[slice, slice]:
 
 
 def _cut(image: UInt8[Array, "h w 3"], window: tuple[slice, slice]) -> UInt8[Array, "h w 3"]:
-    return image[window]
+    """A part; twice as large where it is small."""
+    import cv2
+
+    part = image[window]
+    if len(part) >= _SMALL:
+        return part
+    return np.asarray(cv2.resize(part, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC))
 
 
 def _joined(cells: Sequence[UInt8[Array, "h w 3"]], axis: int) -> UInt8[Array, "h w 3"]:
@@ -148,47 +176,6 @@ def _joined(cells: Sequence[UInt8[Array, "h w 3"]], axis: int) -> UInt8[Array, "
     return np.concatenate(parts, axis=axis)
 
 
-ABOUT = (
-    "Examples from every other stretch of 15 frames of a clip, held-out frames from the stretches "
-    "between; the frame's points in, a picture out, compared with the frame within the hull of its "
-    "landmarks. Detail: deviation of what is finer than about 2 px, in shares of the frame's own. "
-    "Medians over the frames, quartiles beside them; a gain is the median of the frames' gains."
-)
-BOTH = "Over each of the others, on the median frame; both halves of each clip in turn."
-SWITCHED = "The same examples and frames, other options of `synthesis.coefficients`."
-EACH = ("PSNR, dB", "quartiles", "SSIM", "detail", "over neutral, dB", "quartiles", "frames ahead")
-AHEAD = ("dB", "SSIM", "frames ahead")
-
-
-def cells_of(values: Float[Array, "f 3"], base: Float[Array, "f 3"]) -> list[object]:
-    """For the tables: EACH of one way."""
-    psnr, ssim, detail = np.median(values, axis=0)
-    gain = values[:, 0] - base[:, 0]
-    return [
-        f"{psnr:.2f}",
-        _quartiles(values[:, 0]),
-        f"{ssim:.3f}",
-        f"{detail:.2f}",
-        f"{np.median(gain):.2f}",
-        _quartiles(gain),
-        f"{np.mean(gain > 0):.0%}",
-    ]
-
-
-def _quartiles(values: Array) -> str:
-    return " to ".join(f"{value:.1f}" for value in np.percentile(values, [25, 75]))
-
-
-def ahead(found: Found) -> list[object]:
-    """Synthesised against both others: AHEAD twice."""
-    cells: list[object] = []
-    for other in (NEUTRAL, NEAREST):
-        gain = found[MIEN] - found[other]
-        psnr, ssim, _ = np.median(gain, axis=0)
-        cells += [f"{psnr:.2f}", f"{ssim:.3f}", f"{np.mean(gain[:, 0] > 0):.0%}"]
-    return cells
-
-
 def write_sheet(path: Path, tried: Trial, found: Found) -> None:
     """Frames from those that gain little to those that gain much."""
     order = np.argsort(found[MIEN][:, 0] - found[NEUTRAL][:, 0])
@@ -197,61 +184,32 @@ def write_sheet(path: Path, tried: Trial, found: Found) -> None:
     save_image(path, tried.sheet(rows), quality=85)
 
 
-class Report:
-    """The tables as they fill up."""
-
-    def __init__(self) -> None:
-        self._halves: list[list[object]] = []
-        self._compared: list[list[object]] = []
-        self._switched: list[list[object]] = []
-
-    def compare(self, name: str, blocks: str, tried: Trial) -> Found:
-        """Synthesised beside both others."""
-        found = {way: tried.measured(shares) for way, shares in COMPARED.items()}
-        counts = (len(tried.examples.examples), len(tried.rows))
-        self._halves.append([name, blocks, *counts, *ahead(found)])
-        print(self._halves[-1], file=sys.stderr)
-        return found
-
-    def detail(self, name: str, tried: Trial, found: Found) -> None:
-        """Each way for itself, and what switches do."""
-        for way, values in found.items():
-            self._compared.append([name, way, *cells_of(values, found[NEUTRAL])])
-        for way, shares in SWITCHES.items():
-            cells = cells_of(tried.measured(shares), found[NEUTRAL])
-            self._switched.append([name, way, *cells])
-
-    def parts(self) -> list[str]:
-        """For the results."""
-        of = [f"over {other}: {what}" for other in (NEUTRAL, NEAREST) for what in AHEAD]
-        each = ["clip", "", *EACH]
-        return [
-            ABOUT,
-            BOTH,
-            markdown_table(
-                ["clip", "examples from blocks", "examples", "frames", *of], self._halves
-            ),
-            "## Odd blocks",
-            markdown_table(each, self._compared),
-            "## Switches",
-            SWITCHED,
-            markdown_table(each, self._switched),
-        ]
+def switches(tried: Trial, single: Trial, base: Array) -> dict[str, tuple[Array, Array]]:
+    """What each gives, and the warp of neutral beside it."""
+    found = {way: (tried.measured(shares), base) for way, shares in SWITCHES.items()}
+    found[SINGLE] = (single.measured(coefficients), single.measured(neutral_alone))
+    return found
 
 
-def run(clips: Mapping[str, FilmedFace], asked: argparse.Namespace) -> Report:
+def run(asked: argparse.Namespace, paths: Mapping[str, Path]) -> Report:
     """Everything that is measured; draws the sheets on the way."""
-    report = Report()
-    for name, face in clips.items():
-        count = asked.examples or EXAMPLES.get(name, 40)
-        for blocks in ("odd", "even"):
-            tried = trial(face, examples=count, frames=asked.frames, odd=blocks == "odd")
-            found = report.compare(name, blocks, tried)
-            if blocks == "even":
-                continue
-            report.detail(name, tried, found)
-            if asked.sheets or name in SHIPPED:
-                write_sheet((asked.sheets or IMAGES) / f"expressions-{name}.jpg", tried, found)
+    report, layout = Report(), load_feature_layout()
+    with LandmarkDetector() as detector:
+        for name, path in paths.items():
+            face = filmed(path, layout, detector)
+            size = Size(asked.examples or EXAMPLES.get(name, 40), asked.frames)
+            for blocks in ("odd", "even"):
+                tried = trial(face, detector, size, odd=blocks == "odd")
+                found = {way: tried.measured(shares) for way, shares in COMPARED.items()}
+                counts = (len(tried.examples.examples), len(tried.rows))
+                report.compare(name, blocks, counts, found)
+                if blocks == "even":
+                    continue
+                single = trial(face, None, size, odd=True)
+                report.detail(name, found, switches(tried, single, found[NEUTRAL]))
+                if asked.sheets or name in SHIPPED:
+                    folder = asked.sheets or IMAGES
+                    write_sheet(folder / f"expressions-{name}.jpg", tried, found)
     return report
 
 
@@ -274,10 +232,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not path.is_file():
             print(f"error: {path}: expected the clip, found nothing", file=sys.stderr)
             return 2
-    layout = load_feature_layout()
-    with LandmarkDetector() as detector:
-        clips = {name: filmed(path, layout, detector) for name, path in paths.items()}
-    report = run(clips, asked)
+    report = run(asked, paths)
     title = "How near synthesised expressions come"
     write_results("expression_quality", title, report.parts())
     return 0

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,19 @@ from mien.capture.video import Video
 from mien.synthesis.choose import ExampleCandidates, choose_examples
 from mien.synthesis.examples import Example, ExampleSet
 from mien.synthesis.motion import compensated
+from mien.synthesis.steady import steady_points
 
-__all__ = ["FilmedFace", "Likeness", "examples_of", "face_mask", "filmed", "held_out", "likeness"]
+__all__ = [
+    "FilmedFace",
+    "Likeness",
+    "chosen_rows",
+    "example_set",
+    "face_mask",
+    "filmed",
+    "held_out",
+    "likeness",
+    "steadied",
+]
 
 BLOCK = 15
 """Frames that stay together, so that no held-out frame has its neighbour among the examples."""
@@ -77,32 +89,49 @@ def filmed(clip: Path, layout: FeatureLayout, detector: LandmarkDetector) -> Fil
     )
 
 
-def examples_of(face: FilmedFace, count: int, *, odd: bool = True) -> ExampleSet:
-    """Examples from the odd blocks, or from the even ones, chosen as mien chooses them."""
+def steadied(face: FilmedFace, rows: Collection[int], detector: LandmarkDetector) -> FilmedFace:
+    """The same with steady points in some frames, which several looks at each have found."""
+    points = face.points.copy()
+    for row in rows:
+        frame, landmarks = face.frames[row], face.landmarks[row]
+        points[row] = steady_points(face.layout, detector, frame, landmarks)
+    return replace(face, points=points)
+
+
+def chosen_rows(face: FilmedFace, count: int, *, odd: bool) -> list[int]:
+    """Rows of the examples from the odd blocks, or the even ones, chosen as mien chooses them."""
     rows = np.flatnonzero((face.index // BLOCK % 2 == 1) == odd)
-    points, gaps = face.points[rows], face.lip_gaps[rows]
-    neutral = _at_rest(points, gaps)
+    points = face.points[rows]
+    neutral = _at_rest(points, face.lip_gaps[rows])
     geometries, _ = compensated(points, points[neutral])
     shapes = default_subregions(face.layout, points[neutral], (1, 1))
     regions = list(zip(shapes.names, shapes.members, strict=True))
     candidates = ExampleCandidates(geometries, face.sharpness[rows], face.pose[rows])
     chosen = choose_examples(candidates, regions, neutral, count=count).rows
-    standard = int(gaps[chosen].argmax())
+    return [int(row) for row in rows[chosen]]
+
+
+def example_set(face: FilmedFace, rows: Sequence[int]) -> ExampleSet:
+    """Frames as examples, the first one neutral, that with the widest open mouth the standard."""
+    chosen, gaps = face.points[rows], face.lip_gaps[rows]
+    standard = int(gaps.argmax())
     height, width = face.frames[0].shape[:2]
+    geometries, _ = compensated(chosen, chosen[0])
     return ExampleSet(
         layout=face.layout,
-        examples=tuple(_example(face, int(row)) for row in rows[chosen]),
+        examples=tuple(_example(face, row) for row in rows),
         standard=standard,
         statistics=geometries,
-        subregions=default_subregions(face.layout, points[chosen[standard]], (width, height)),
-        teeth=tuple(np.flatnonzero(gaps[chosen] >= TEETH_SHOW).tolist()),
+        subregions=default_subregions(face.layout, chosen[standard], (width, height)),
+        teeth=tuple(np.flatnonzero(gaps >= TEETH_SHOW).tolist()),
     )
 
 
-def held_out(face: FilmedFace, count: int, *, odd: bool = True, skip: int = 0) -> list[int]:
+def held_out(face: FilmedFace, count: int, *, odd: bool, skip: int = 0) -> list[int]:
     """So many rows at even distances of the blocks that no example is from.
 
     Args:
+        odd: the blocks that examples are from.
         skip: 0 to 1, how far between two of them each begins.
     """
     rows = np.flatnonzero((face.index // BLOCK % 2 == 1) != odd)
