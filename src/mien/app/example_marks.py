@@ -11,13 +11,12 @@ from mien.arrays import Array, Float
 from mien.assets.feature_points import FeatureLayout
 from mien.assets.generic import load_generic_head
 from mien.capture.annotations import AnnotationNames, load_annotations
-from mien.capture.face_series import FaceSeries
 from mien.capture.folder import ANNOTATIONS
 from mien.capture.photos import Photo
 from mien.formats.points_file import read_points
 from mien.formats.strict_json import read_json
 
-__all__ = ["mark_files", "points_of", "read_marks", "with_marks"]
+__all__ = ["all_with_marks", "mark_files", "read_marks", "with_marks"]
 
 OF_HEADS = tuple(
     [f"{side}_{part}" for side in ("right", "left") for part in ("eye_outer", "eye_inner")]
@@ -80,11 +79,11 @@ def with_marks(
     return result
 
 
-def points_of(
-    series: FaceSeries, layout: FeatureLayout, marks: Mapping[int, Marks]
+def all_with_marks(
+    layout: FeatureLayout, points: Float[Array, "N n 2"], marks: Mapping[int, Marks]
 ) -> Float[Array, "N n 2"]:
-    """Feature points in all pictures of a series; marks by row win."""
-    points: Array = np.einsum("nk,fkd->fnd", layout.mixes, series.landmarks)
+    """Detected points of all pictures; marks, by row, win."""
+    result: Array = points.copy()
     for row, found in marks.items():
-        points[row] = with_marks(layout, points[row], found)
-    return points
+        result[row] = with_marks(layout, points[row], found)
+    return result

@@ -11,8 +11,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mien.app.example_marks import Marks, mark_files, points_of, read_marks, with_marks
-from mien.arrays import Array, Float
+import numpy as np
+
+from mien.app.example_marks import Marks, all_with_marks, mark_files, read_marks, with_marks
+from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.detector import LandmarkDetector
 from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of, rows_of
@@ -25,6 +27,7 @@ from mien.formats.example_folder import (
 )
 from mien.formats.image import encode_image
 from mien.report.example_sheet import example_sheet
+from mien.synthesis.brows import detected_points
 from mien.synthesis.covered import LipColours
 from mien.synthesis.examples import ExampleSet
 from mien.synthesis.gather import COUNT, ExamplePlan, Wishes, build_examples, plan_examples
@@ -138,20 +141,20 @@ def gather_examples(
     """
     request, layout = request or ExampleRequest(), layout or load_feature_layout()
     tell = progress or (lambda stage, done, total: None)
-    lips = LipColours(layout)
+    looked = _Looked(layout)
     with LandmarkDetector() as detector:
         series = find_faces(
             source,
             detector,
             max_side=request.max_side,
             face=request.face,
-            look=lips,
+            look=looked,
             report=partial(tell, FINDING),
         )
     wishes = request.wishes(series)
     marks = _marks(series, layout)
-    points = points_of(series, layout, marks)
-    unfit = unfit_reasons(points, series.sizes, lips.covered(series.seconds))
+    points = all_with_marks(layout, np.stack(looked.points), marks)
+    unfit = unfit_reasons(points, series.sizes, looked.lips.covered(series.seconds))
     plan = plan_examples(layout, series, points, wishes=wishes, unfit=unfit, count=request.count)
     rows = plan.choice.rows.tolist()
     photos = dict(load_pictures(series, rows, partial(tell, FETCHING)))
@@ -186,6 +189,19 @@ def _steady(
             found[row] = with_marks(layout, points, marks.get(row, {}))
             report(number + 1, len(photos))
     return found
+
+
+class _Looked:
+    """What is taken from each picture as long as its pixels are there."""
+
+    def __init__(self, layout: FeatureLayout) -> None:
+        self.lips = LipColours(layout)
+        self.points: list[Array] = []
+        self._layout = layout
+
+    def __call__(self, pixels: UInt8[Array, "h w 3"], landmarks: Float[Array, "478 2"]) -> None:
+        self.lips(pixels, landmarks)
+        self.points.append(detected_points(self._layout, pixels, landmarks))
 
 
 def _marks(series: FaceSeries, layout: FeatureLayout) -> dict[int, Marks]:
