@@ -64,7 +64,7 @@ def coefficients(
         points: (n, 2) px of any photo, all that the layout has.
         distance_penalty: the paper has 0. Beyond it, what an example costs by its squared distance
             from the geometry asked for, those being 1 in the mean: of two mixes that fit alike,
-            the one of near examples wins: 0.0 to 0.4 dB by the mean of the frames on six halves
+            the one of near examples wins: 0.0 to 0.3 dB by the mean of the frames on six halves
             of four clips. 0.2 takes up to 0.3 dB again and leaves more detail.
         together: groups of subregions, by name, that get the same shares, from all their points;
             the paper has none: (). Unless given, `BROWS` where there are such subregions.
