@@ -32,6 +32,7 @@ from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import load_feature_layout
 from mien.capture.detector import LandmarkDetector
 from mien.formats.image import save_image
+from mien.synthesis.choose import COUNT
 from mien.synthesis.coefficients import BROWS, UPPER_FACE, coefficients
 from mien.synthesis.compose import Composer
 from mien.synthesis.examples import ExampleSet
@@ -41,8 +42,6 @@ Shares = Callable[[ExampleSet, Array], Array]
 
 SHEET_ROWS = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Frames of a sheet: which share of all gain less."""
-EXAMPLES = {"d6": 60}
-"""Of clips with twice the frames and more expressions."""
 SHIPPED = ("cap12", "cap13")
 """Clips whose pictures may be shown (data/README.md of the development data)."""
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
@@ -197,7 +196,7 @@ def run(asked: argparse.Namespace, paths: Mapping[str, Path]) -> Report:
     with LandmarkDetector() as detector:
         for name, path in paths.items():
             face = filmed(path, layout, detector)
-            size = Size(asked.examples or EXAMPLES.get(name, 40), asked.frames)
+            size = Size(asked.examples, asked.frames)
             for blocks in ("odd", "even"):
                 tried = trial(face, detector, size, odd=blocks == "odd")
                 found = {way: tried.measured(shares) for way, shares in COMPARED.items()}
@@ -219,7 +218,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="python -m benchmarks.expression_quality", description=__doc__
     )
     parser.add_argument("clips", nargs="*", metavar="NAME[=CLIP]", help="by default the six")
-    parser.add_argument("--examples", type=int, help="at most; by default 40, of d6 60")
+    parser.add_argument("--examples", type=int, default=COUNT, help="at most")
     parser.add_argument("--frames", type=int, default=45, help="held out of each clip")
     parser.add_argument(
         "--sheets", type=Path, help="folder for sheets of all clips; by default docs/images, "

@@ -21,7 +21,7 @@ def examples(
     output: Annotated[
         Path, typer.Option("-o", "--output", help="The folder of examples that is written.")
     ],
-    count: Annotated[int, typer.Option(min=1, max=1000, help="How many examples at most.")] = 40,
+    count: Annotated[int, typer.Option(min=1, max=1000, help="How many examples at most.")] = 60,
     neutral: Annotated[
         str | None,
         typer.Option(metavar=_PICTURE, help="The face at rest; found by default."),

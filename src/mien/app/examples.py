@@ -28,9 +28,10 @@ from mien.formats.example_folder import (
 from mien.formats.image import encode_image
 from mien.report.example_sheet import example_sheet
 from mien.synthesis.brows import detected_points
+from mien.synthesis.choose import COUNT
 from mien.synthesis.covered import LipColours
 from mien.synthesis.examples import ExampleSet
-from mien.synthesis.gather import COUNT, ExamplePlan, Wishes, build_examples, plan_examples
+from mien.synthesis.gather import ExamplePlan, Wishes, build_examples, plan_examples
 from mien.synthesis.steady import steady_points
 from mien.synthesis.unfit import COVERED, CUT, unfit_reasons
 

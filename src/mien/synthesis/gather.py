@@ -17,6 +17,7 @@ from mien.capture.folder import NEUTRAL
 from mien.capture.frame_choice import FrameScores, choose_frames
 from mien.capture.photos import Photo
 from mien.synthesis.choose import (
+    COUNT,
     DETECTOR_NOISE,
     ExampleCandidates,
     ExampleChoice,
@@ -29,7 +30,6 @@ from mien.synthesis.motion import compensated
 __all__ = ["ExamplePlan", "Wishes", "build_examples", "lip_gaps", "plan_examples"]
 
 ASKED_FOR = "as asked for"
-COUNT = 40
 DIFFERENT = 3.0
 """Two examples differ in some subregion by so many times the detector's noise. On three quiet clips
 held-out pictures are as near with 3 as without any such limit (18, 40 and 19 examples instead of
