@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from mien.model.head import Head
     from mien.render.picture import HeadRenderer, render_head
     from mien.synthesis.examples import Example, ExampleSet
+    from mien.synthesis.head_synthesizer import HeadSynthesis, HeadSynthesizer
     from mien.synthesis.synthesizer import Synthesis, SynthesisOptions, Synthesizer
     from mien.track.state import Track, TrackedFrame, TrackState
     from mien.track.tracker import Tracker, TrackOptions
@@ -51,6 +52,8 @@ __all__ = [
     "Gaze",
     "Head",
     "HeadRenderer",
+    "HeadSynthesis",
+    "HeadSynthesizer",
     "InputError",
     "LandmarkDetector",
     "Mesh",
@@ -98,6 +101,8 @@ _HOMES = {
     "Gaze": "expressions.state",
     "Head": "model.head",
     "HeadRenderer": "render.picture",
+    "HeadSynthesis": "synthesis.head_synthesizer",
+    "HeadSynthesizer": "synthesis.head_synthesizer",
     "InputError": "errors",
     "LandmarkDetector": "capture.detector",
     "Mesh": "mesh",
