@@ -6,11 +6,25 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
+from tokenize import TokenError
 
 import numpy as np
 
 from mien.arrays import Array
 from mien.errors import FileFormatError
+
+_DAMAGED = (
+    OSError,
+    ValueError,
+    EOFError,
+    zipfile.BadZipFile,
+    zlib.error,
+    TokenError,
+    NotImplementedError,
+    RuntimeError,
+)
+"""What numpy and zipfile raise for changed bytes; the last two for kinds of compression and locks
+that they do not know."""
 
 
 class NamedArrays(dict[str, Array]):
@@ -31,9 +45,13 @@ def read_arrays(path: Path) -> NamedArrays:
     """
     try:
         # Opened here: numpy leaves the file open when it is no archive.
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            return NamedArrays(path, {name: file[name] for name in file.files})
+        with path.open("rb") as stream:
+            file = np.load(stream, allow_pickle=False)
+            if not isinstance(file, np.lib.npyio.NpzFile):
+                raise FileFormatError(path, "expected an .npz file, found a single array")
+            with file:
+                return NamedArrays(path, {name: file[name] for name in file.files})
     except FileNotFoundError:
         raise FileFormatError(path, "there is no such file") from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except _DAMAGED as error:
         raise FileFormatError(path, f"not a readable .npz file ({error})") from None
