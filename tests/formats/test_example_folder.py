@@ -81,11 +81,39 @@ def test_what_is_written_is_read_again_exactly(folder: Path, example_set: Exampl
 
 
 def test_subregions_of_ones_own_are_kept(tmp_path: Path, example_set: ExampleSet) -> None:
-    fades = np.random.default_rng(1).random((140, 150, 2), np.float32)
+    fades = np.random.default_rng(1).random((140, 150, 2), np.float32) / 2
     own = Subregions(("upper", "lower"), fades, (np.arange(60), np.arange(50, 134)))
     changed = replace(example_set, subregions=own)
     write_examples(tmp_path / "set", changed)
     assert_same(load_examples(tmp_path / "set"), changed)
+
+
+@pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        ({"names": np.array("upper")}, "names: expected a list, found upper"),
+        ({"names": np.array(["upper", "upper"])}, "subregions: expected names of their own"),
+        ({"members/lower": np.array([1.5])}, "members of lower: expected indices of points"),
+        ({"members/lower": np.arange(0)}, "members of lower: expected indices of points, one"),
+        ({"fades": np.zeros((140, 150, 3))}, r"fades: expected shape \(140, 150, 2\) of standard"),
+        ({"fades": np.full((140, 150, 2), np.nan)}, "fades: expected finite numbers"),
+        (
+            {"fades": np.full((140, 150, 2), 255)},
+            r"fades: expected shares .*, got 255 and a sum of",
+        ),
+        ({"fades": np.full((140, 150, 2), -1.0)}, r"fades: expected shares .*, got -1 and a sum"),
+    ],
+)
+def test_subregions_that_are_none(
+    tmp_path: Path, example_set: ExampleSet, arrays: dict[str, Array], message: str
+) -> None:
+    fades = np.full((140, 150, 2), 0.5, np.float32)
+    own = Subregions(("upper", "lower"), fades, (np.arange(60), np.arange(50, 134)))
+    write_examples(tmp_path / "set", replace(example_set, subregions=own))
+    file = tmp_path / "set" / "subregions.npz"
+    np.savez(file, **(dict(np.load(file)) | arrays))
+    with pytest.raises(FileFormatError, match=r"subregions\.npz: .*" + message):
+        load_examples(tmp_path / "set")
 
 
 def test_textures_lie_over_the_standard_image(folder: Path, example_set: ExampleSet) -> None:

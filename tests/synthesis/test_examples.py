@@ -110,3 +110,9 @@ def test_subregions_are_drawn_over_the_standard_image(example_set):
 def test_statistics_are_of_the_layout(example_set):
     with pytest.raises(InputError, match="statistics"):
         replace(example_set, statistics=np.zeros((4, 5, 2)))
+
+
+def test_subregions_over_another_layout(example_set):
+    other = replace(example_set.subregions, members=(np.array([3, 134]),))
+    with pytest.raises(InputError, match="members of face: expected points from 0 to 133, got 134"):
+        replace(example_set, subregions=other)

@@ -18,6 +18,8 @@ __all__ = ["SubregionDrawing", "Subregions", "default_subregions", "load_subregi
 
 FORMAT = "mien subregions"
 _TEMPLATE_WIDTH_PX = 300
+_MOST_FADED = 1.001
+"""Of all subregions together at a pixel: 1, but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +52,31 @@ class Subregions:
             to 0 around it.
         members: of each, the indices of the feature points within it or on its boundary, and of
             others that tell about it: lids follow the pupil.
+    Raises: InputError: two of one name, fades for another number of them, below 0 or together
+        above 1, one without a point that tells about it.
     """
 
     names: tuple[str, ...]
     fades: Float[Array, "h w r"]
     members: tuple[Int[Array, " m"], ...]
+
+    def __post_init__(self) -> None:
+        """Check what a user may have drawn."""
+        count = len(self.names)
+        if len(set(self.names)) < count:
+            raise InputError("subregions", "names of their own", ", ".join(self.names))
+        fades = check_array("fades", self.fades, (None, None, count), dtype=np.float32)
+        object.__setattr__(self, "fades", fades)
+        if not (fades.min(initial=0) >= 0 and fades.sum(axis=2).max(initial=0) <= _MOST_FADED):
+            found = f"{fades.min():g} and a sum of {fades.sum(axis=2).max():g}"
+            raise InputError("fades", "shares from 0 on that sum to 1 at most", found)
+        if len(self.members) != count:
+            raise InputError("members", f"of each of {count} subregions", len(self.members))
+        for name, members in zip(self.names, self.members, strict=True):
+            kind = members.dtype.kind
+            if members.ndim != 1 or kind not in "iu" or not members.size or members.min() < 0:
+                found = f"{members.dtype} of shape {members.shape}: {str(members)[:40]}"
+                raise InputError(f"members of {name}", "indices of points, one at least", found)
 
 
 def default_subregions(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -200,17 +199,21 @@ def _statistics(path: Path, layout: FeatureLayout) -> Float[Array, "N n 2"]:
 
 def _subregions(path: Path, layout: FeatureLayout, standard: Example) -> Subregions:
     height, width = standard.photo.shape[:2]
-    usual = default_subregions(layout, standard.points, (width, height))
     if not path.exists():
-        return usual
+        return default_subregions(layout, standard.points, (width, height))
     arrays = read_arrays(path)
+    if arrays["names"].ndim != 1:
+        raise FileFormatError(path, f"expected a list, found {arrays['names']}", "names")
     names = tuple(str(name) for name in arrays["names"])
     members = tuple(arrays[f"members/{name}"] for name in names)
     fades = arrays["fades"]
     if fades.shape != (height, width, len(names)):
         problem = f"expected shape {(height, width, len(names))} of standard.png, found"
         raise FileFormatError(path, f"{problem} {fades.shape}", "fades")
-    return replace(usual, names=names, fades=fades, members=members)
+    try:
+        return Subregions(names, fades, members)
+    except InputError as error:
+        raise FileFormatError(path, str(error)) from None
 
 
 def _subregion_arrays(subregions: Subregions) -> dict[str, Any]:

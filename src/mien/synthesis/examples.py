@@ -56,7 +56,7 @@ class ExampleSet:
         teeth: the examples that the teeth are made from; all where none is named. Those with a
             closed mouth have none to show.
     Raises: InputError: no example, two of one name, points of another layout, no such `standard`
-        or teeth, subregions that are drawn over a picture of another size.
+        or teeth, subregions that are drawn over a picture of another size or another layout.
     Source: Z06 sections 5 and 8.
     """
 
@@ -83,6 +83,11 @@ class ExampleSet:
                 raise InputError(name, f"the index of one of {len(self.examples)} examples", row)
         size = self.examples[self.standard].photo.shape[:2]
         check_array("fades", self.subregions.fades, (*size, None), dtype=np.float32)
+        for name, members in zip(self.subregions.names, self.subregions.members, strict=True):
+            if members.max() >= count:
+                raise InputError(
+                    f"members of {name}", f"points from 0 to {count - 1}", members.max()
+                )
         statistics = check_array("statistics", self.statistics, (None, count, 2))
         object.__setattr__(self, "statistics", frozen(statistics))
 
