@@ -240,7 +240,7 @@ def flipped(points: Array) -> Array:
         (
             lambda points: 0 * points + 50,
             ("menton", "nose_tip", "right_mouth_corner"),
-            "head motion needs points apart from each other",
+            "P.json: motion in the plane needs points apart from each other",
         ),
     ],
     ids=["flipped", "exchanged", "far outside", "two", "one", "one place"],

@@ -10,6 +10,7 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import Subregions, default_subregions
 from mien.errors import InputError
+from mien.numeric.planar_motion import PlanarMotion
 from mien.synthesis.coefficients import (
     BROWS,
     UPPER_FACE,
@@ -19,7 +20,6 @@ from mien.synthesis.coefficients import (
     hull_distances,
 )
 from mien.synthesis.examples import Example, ExampleSet
-from mien.synthesis.motion import PlanarMotion
 
 PHOTO = np.zeros((30, 20, 3), np.uint8)
 MOVED = PlanarMotion(np.array(1.2), np.array(0.1), np.array([3.0, 8.0]))

@@ -11,9 +11,9 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
 from mien.errors import InputError
+from mien.numeric.planar_motion import PlanarMotion
 from mien.synthesis.compose import Composer
 from mien.synthesis.examples import Example, ExampleSet
-from mien.synthesis.motion import PlanarMotion
 
 WIDTH, HEIGHT, COUNT = 240, 300, 4
 MATRIX, SHIFT = np.array([[0.98, 0.05], [-0.03, 1.02]]), np.array([2.0, -3.0])

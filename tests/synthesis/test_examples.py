@@ -10,8 +10,8 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import Subregions
 from mien.errors import InputError
+from mien.numeric.planar_motion import PlanarMotion
 from mien.synthesis.examples import Example, ExampleSet
-from mien.synthesis.motion import PlanarMotion
 
 TURNED = PlanarMotion(np.array(0.9), np.array(0.1), np.array([7.0, -3.0]))
 PHOTO = np.zeros((120, 100, 3), np.uint8)

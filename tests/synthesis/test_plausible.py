@@ -10,8 +10,8 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
 from mien.errors import EstimationError, InputError
+from mien.numeric.planar_motion import PlanarMotion
 from mien.synthesis.examples import Example, ExampleSet
-from mien.synthesis.motion import PlanarMotion
 from mien.synthesis.plausible import (
     ENOUGH_STATISTICS,
     STRANGER,

@@ -11,9 +11,9 @@ import numpy as np
 from mien.app.example_marks import read_marks, with_marks
 from mien.arrays import Array, Float, Int
 from mien.capture.photos import load_photo
-from mien.errors import InputError
+from mien.errors import EstimationError, InputError
 from mien.formats.points_file import read_points
-from mien.synthesis.motion import PlanarMotion
+from mien.numeric.planar_motion import PlanarMotion
 from mien.synthesis.plausible import STRANGER, face_width, head_moved, look_mirrored, oddness
 from mien.synthesis.steady import steady_points
 from mien.synthesis.synthesizer import LEAST_TELLING, Synthesizer
@@ -108,7 +108,11 @@ def _check_sides(
     synthesizer: Synthesizer, path: str | Path, known: Int[Array, " k"], positions: Array
 ) -> None:
     examples = synthesizer.examples
-    if look_mirrored(examples.layout, examples.neutral.points, known, positions):
+    try:
+        mirrored = look_mirrored(examples.layout, examples.neutral.points, known, positions)
+    except EstimationError as error:
+        raise EstimationError(f"{path}: {error}") from None
+    if mirrored:
         expected = "right and left as the subject has them"
         raise InputError(path, expected, "points that fit the face only when mirrored")
 

@@ -14,6 +14,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int, check_array, frozen
 from mien.assets.data_file import Broken, need, read_data, shares
 from mien.errors import InputError
+from mien.numeric.planar_motion import estimate_planar_motion
 
 __all__ = ["FeatureLayout", "load_feature_layout"]
 
@@ -79,21 +80,12 @@ class FeatureLayout:
     def frame(self, points: Float[Array, "n 2"]) -> Float[Array, "k 2"]:
         """Points around the face that follow the head and no expression, in the same pixels.
 
-        Raises: InputError: shape, NaN.
+        Raises: InputError: shape, NaN. EstimationError: rigid points in one place.
         Source: Z06 section 12, eq. (8) and (9), over the rigid points.
         """
         points = check_array("points", points, (len(self.names), 2))
-        source, target = _complex(self.template[self.rigid]), _complex(points[self.rigid])
-        from_mean = source - source.mean()
-        scale = np.vdot(from_mean, target) / np.vdot(from_mean, from_mean)
-        placed = target.mean() + scale * (_complex(self.surround) - source.mean())
-        return np.column_stack([placed.real, placed.imag])
-
-
-def _complex(points: Float[Array, "n 2"]) -> Array:
-    """Points of the plane as numbers: a similarity is then a product and a sum."""
-    numbers: Array = points[:, 0] + 1j * points[:, 1]
-    return numbers
+        motion = estimate_planar_motion(self.template[self.rigid], points[self.rigid])
+        return motion(self.surround)
 
 
 def load_feature_layout(path: str | Path | None = None) -> FeatureLayout:

@@ -6,13 +6,13 @@ import numpy as np
 
 from mien.arrays import Array, Float, UInt8, check_array, frozen
 from mien.errors import InputError
+from mien.numeric.planar_motion import PlanarMotion, estimate_planar_motion
 from mien.numeric.threads import for_row_bands
 from mien.numeric.warp import affine_maps, facing, snapped
 from mien.render.mipmap import packed_texels
 from mien.synthesis.compose_kernel import PART, Mixtures, Photos, draw_rows
 from mien.synthesis.examples import ExampleSet
 from mien.synthesis.fade_map import fade_map
-from mien.synthesis.motion import PlanarMotion, estimate_planar_motion
 
 __all__ = ["Composer"]
 

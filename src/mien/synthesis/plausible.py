@@ -7,9 +7,10 @@ import numpy as np
 from mien.arrays import Array, Float, Int, check_array
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import InputError
+from mien.numeric.planar_motion import estimate_planar_motion
 from mien.synthesis.examples import ExampleSet
 from mien.synthesis.inferred import check_known
-from mien.synthesis.motion import compensated, estimate_planar_motion
+from mien.synthesis.motion import compensated
 
 __all__ = ["ENOUGH_STATISTICS", "STRANGER", "face_width", "head_moved", "look_mirrored", "oddness"]
 

@@ -11,12 +11,13 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8, check_array, frozen
 from mien.errors import InputError
+from mien.numeric.planar_motion import PlanarMotion, estimate_planar_motion
 from mien.synthesis.coefficients import DISTANCE_PENALTY, coefficients, distances_of
 from mien.synthesis.compose import Composer
 from mien.synthesis.conditional import ConditionalMotion
 from mien.synthesis.examples import ExampleSet
 from mien.synthesis.inferred import Inference, check_known
-from mien.synthesis.motion import PlanarMotion, compensated, estimate_planar_motion
+from mien.synthesis.motion import compensated
 from mien.synthesis.propagate import Propagation
 
 __all__ = [
