@@ -106,6 +106,11 @@ def test_blurred_and_turned_ones_are_left_out(candidates):
     assert choice.reasons[20] == "turned away by 40 degrees"
 
 
+def test_where_nothing_is_sharp_nothing_is_blurred(candidates):
+    plain = replace(candidates, sharpness=np.zeros(30))
+    assert choose_examples(plain, REGIONS, 4, count=3).sound.all()
+
+
 def test_the_turn_is_measured_from_neutral(candidates):
     candidates = replace(candidates, pose=np.tile([0.6, 0.0], (30, 1)))
     assert len(choose_examples(candidates, REGIONS, 4, count=30).rows) == 30

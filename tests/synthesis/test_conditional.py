@@ -51,6 +51,13 @@ def test_what_is_usual_is_expected_when_the_usual_is_given(rng):
     np.testing.assert_allclose(found.displacements, mean, atol=1e-9)
 
 
+@pytest.mark.parametrize("way", [ConditionalMotion, lambda rows: Propagation(LAYOUT, rows)])
+def test_where_no_expression_was_seen_all_is_at_rest(way, rng):
+    rest = np.tile(rng.normal(size=(POINTS, 2)), (3, 1, 1))
+    found = way(rest).infer(KNOWN, rest[0, KNOWN] + 2)
+    np.testing.assert_allclose(found.displacements, rest[0], atol=1e-9)
+
+
 def test_propagation_in_one_set_with_prior_comes_to_the_same(rng):
     statistics = expressions(rng, 6, noise=1.0)
     given = statistics[0, KNOWN] + rng.normal(size=(len(KNOWN), 2))

@@ -106,6 +106,16 @@ def test_all_points_stay_where_they_are(person):
     np.testing.assert_array_equal(completed, truth)
 
 
+def test_one_picture_tells_of_no_other_points(person):
+    """All points need none; from a few, nothing can be learned."""
+    truth = new_expression(person)
+    synthesizer = Synthesizer(replace(person[0], statistics=person[0].statistics[:1]))
+    completed = synthesizer.complete(np.arange(len(truth)), truth)
+    np.testing.assert_array_equal(completed, truth)
+    with pytest.raises(InputError, match=r"examples: expected points of 2 .*got 1"):
+        synthesizer.complete(np.arange(5), truth[:5])
+
+
 def test_a_set_of_points_is_learned_once(person, monkeypatch):
     from mien.synthesis import synthesizer as module
 

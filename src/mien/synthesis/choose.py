@@ -59,7 +59,9 @@ class ExampleCandidates:
     def left_out(self, neutral: int, max_turn: float = MAX_TURN) -> list[str]:
         """Why each cannot be an example; empty where it can."""
         turned = np.abs(self.pose - self.pose[neutral]).max(axis=1)
-        share = self.sharpness / np.median(self.sharpness)
+        usual = float(np.median(self.sharpness))
+        # Where most pictures have nothing sharp in them, none is left out for it.
+        share = self.sharpness / usual if usual > 0 else np.ones(len(self.sharpness))
         known = self.unfit or ("",) * len(self.geometries)
         return [
             reason

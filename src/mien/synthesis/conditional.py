@@ -59,7 +59,9 @@ class ConditionalMotion:
         statistics = check_statistics(statistics)
         pca = fit_pca(statistics.reshape(len(statistics), -1), components)
         self._mean = pca.mean.reshape(statistics.shape[1:])
-        self._basis = (pca.components * pca.deviations[:, None]).reshape(-1, *self._mean.shape)
+        scaled = pca.components * pca.deviations[:, None]
+        # Expressions that are all alike have no component.
+        self._basis = scaled.reshape(len(scaled), *self._mean.shape)
         self._noise = max(pca.residual, check_positive("least_noise", least_noise))
         self._most = check_positive("most", most)
         self._near = None
@@ -75,7 +77,7 @@ class ConditionalMotion:
         Raises: InputError: no points, unknown or repeated ones, NaN.
         """
         known, given = check_known(known, displacements, *self._mean.shape)
-        rows = self._basis[:, known].reshape(len(self._basis), -1)
+        rows = self._basis[:, known].reshape(len(self._basis), given.size)
         unusual = (given - self._mean[known]).ravel()
         normal = rows @ rows.T + self._noise**2 * np.eye(len(rows))
         weights = np.linalg.solve(normal, rows @ unusual)

@@ -51,9 +51,10 @@ def steady_points(
     # Reduced before it is turned: what is turned is only looked up between pixels.
     factor = min(_SIDE / (_WIDTHS * width), 1.0)
     small = shrunk(pixels, max(round(factor * max(pixels.shape[:2])), 1))
-    factor = small.shape[1] / pixels.shape[1]
+    # By axis: sides are whole numbers of pixels.
+    by = np.array(small.shape[1::-1]) / pixels.shape[1::-1]
     found = [
-        _seen(layout, detector, small, factor * once, np.radians(turn), mirrored) / factor
+        _seen(layout, detector, small, by * once, np.radians(turn), mirrored) / by
         for turn in turns
         for mirrored in (False, True)
     ]

@@ -126,6 +126,10 @@ class Synthesizer:
         """
         neutral = self.examples.neutral.points
         known, positions = check_known(known, positions, len(neutral))
+        if len(known) == len(neutral):
+            return positions
+        if len(self.examples.statistics) < 2:
+            raise InputError("examples", "points of 2 pictures or more to complete others from", 1)
         told = _checked(head, HeadMotion, "head") == "told" and len(known) >= LEAST_TELLING
         motion = estimate_planar_motion(neutral[known], positions) if told else None
         still = positions if motion is None else motion.undo(positions)
