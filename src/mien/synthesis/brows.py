@@ -30,10 +30,15 @@ _DARK = 16.0
 
 @dataclass(frozen=True)
 class _Brow:
-    """Rows of its points, from the inner end to the tail: along its upper and its lower edge."""
+    """Rows of its points, from the inner end to the tail: along its upper and its lower edge.
+
+    Besides the forehead's points above it, and those of the hairline from the middle outwards.
+    """
 
     upper: Int[Array, " u"]
     lower: Int[Array, " l"]
+    skin: Int[Array, " s"]
+    hair: Int[Array, " h"]
 
 
 def detected_points(
@@ -56,7 +61,8 @@ def on_brows(
     d6, the same where brows hardly move, and double brows are fewer.
 
     Both ends are tried up to 0.1 widths of the face above where they are told to be. A brow is
-    moved only where that is clearly better; most stay.
+    moved only where that is clearly better; most stay. The forehead's points go along, as the
+    skin between the brow and the hairline is pushed together, and are not overtaken by it.
     """
     import cv2
 
@@ -65,12 +71,18 @@ def on_brows(
     smooth = cv2.GaussianBlur(grey, (0, 0), max(_BLUR * width, 0.3)).astype(np.float32)
     logs = np.log(smooth + np.float32(_DARK))
     moved = points.copy()
+    # It goes half with either brow.
+    middle = layout.index("forehead") if "forehead" in layout.names else -1
     for brow, up in _brows(layout, points):
         inner, outer = _raise(logs, points[brow.upper], points[brow.lower], up, width)
         # The lower edge ends before the tail, which is the upper one's last point.
         for rows, last in ((brow.upper, len(brow.upper) - 1), (brow.lower, len(brow.lower))):
             along = np.arange(len(rows)) / last
             moved[rows] += ((1 - along) * inner + along * outer)[:, None] * up
+        if len(brow.skin):
+            along, share = _pushed(points[brow.skin], points[brow.upper], points[brow.hair], up)
+            share[brow.skin == middle] /= 2
+            moved[brow.skin] += (share * ((1 - along) * inner + along * outer))[:, None] * up
     return moved
 
 
@@ -85,12 +97,39 @@ def _brows(
     across = (left - right) / np.linalg.norm(left - right)
     up = np.array([across[1], -across[0]])
     for side in ("right", "left"):
-        edges = [
-            [i for i, n in enumerate(layout.names) if n.startswith(f"{side}_brow_{edge}.")]
-            for edge in ("upper", "lower")
+        rows = [
+            np.array([i for i, name in enumerate(layout.names) if name.startswith(starts)], int)
+            for starts in (
+                f"{side}_brow_upper.",
+                f"{side}_brow_lower.",
+                (f"{side}_forehead.", "forehead"),
+                f"{side}_hairline.",
+            )
         ]
-        if min(map(len, edges)) >= 2:
-            yield _Brow(np.array(edges[0]), np.array(edges[1])), up
+        if min(map(len, rows[:2])) >= 2:
+            yield _Brow(*rows), up
+
+
+def _pushed(
+    skin: Float[Array, "s 2"],
+    brow: Float[Array, "u 2"],
+    hair: Float[Array, "h 2"],
+    up: Float[Array, " 2"],
+) -> tuple[Float[Array, " s"], Float[Array, " s"]]:
+    """Of points above a brow: where along it they lie, and the share of its motion they make.
+
+    All of it at the brow, none at the hairline; half where there is no hairline.
+    """
+    outwards = brow[-1] - brow[0]
+    outwards = outwards - (outwards @ up) * up
+    outwards /= max(float(outwards @ outwards), 1e-12)
+    along = np.clip((skin - brow[0]) @ outwards, 0, 1)
+    low = np.interp(along, (brow - brow[0]) @ outwards, brow @ up)
+    if not len(hair):
+        return along, np.full(len(skin), 0.5)
+    high = np.interp(along, (hair - brow[0]) @ outwards, hair @ up)
+    share = (high - skin @ up) / np.maximum(high - low, 1e-6)
+    return along, np.clip(share, 0, 1)
 
 
 def _raise(
