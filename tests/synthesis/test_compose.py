@@ -14,6 +14,7 @@ from mien.errors import InputError
 from mien.numeric.planar_motion import PlanarMotion
 from mien.synthesis.compose import Composer
 from mien.synthesis.examples import Example, ExampleSet
+from mien.synthesis.surroundings import with_surroundings
 
 WIDTH, HEIGHT, COUNT = 240, 300, 4
 MATRIX, SHIFT = np.array([[0.98, 0.05], [-0.03, 1.02]]), np.array([2.0, -3.0])
@@ -147,7 +148,9 @@ def test_a_moved_picture_is_the_unmoved_one_moved(noisy):
     )
     np.testing.assert_array_equal(moved[9 : 9 + HEIGHT, 17 : 17 + WIDTH], still)
     # Beyond its edges the photo goes on.
-    np.testing.assert_array_equal(moved[:9], np.broadcast_to(moved[9], (9, *moved[9].shape)))
+    larger, margin = with_surroundings(noisy.neutral.photo)
+    above = larger[margin - 9 : margin, margin - 17 : margin - 17 + size[0]]
+    np.testing.assert_array_equal(moved[:9], above)
 
 
 @pytest.mark.parametrize("motion", [similarity(1, 0, 0.5, -0.25), similarity(1.1, 0.2, 31, -33)])
@@ -217,8 +220,9 @@ def test_a_face_outside_of_the_picture_is_no_harm(noisy):
     motion = similarity(1, 0, WIDTH, 40)
     points = noisy.neutral.points + np.array([2 * WIDTH, 40])
     image = Composer(noisy).render(points, shares(noisy, [0, 0, 1, 0]), motion=motion)
-    edge = noisy.neutral.photo[:-40, :1]
-    np.testing.assert_array_equal(image[40:, :20], np.repeat(edge, 20, axis=1))
+    larger, margin = with_surroundings(noisy.neutral.photo)
+    beside = larger[margin : margin + HEIGHT - 40, margin - 20 : margin]
+    np.testing.assert_array_equal(image[40:, -20:], beside)
 
 
 def test_points_that_leave_the_frame_are_no_harm(noisy):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from mien.arrays import Array, Float, UInt8, check_array, frozen
@@ -13,6 +15,7 @@ from mien.render.mipmap import packed_texels
 from mien.synthesis.compose_kernel import PART, Mixtures, Photos, draw_rows
 from mien.synthesis.examples import ExampleSet
 from mien.synthesis.fade_map import fade_map
+from mien.synthesis.surroundings import with_surroundings
 
 __all__ = ["Composer"]
 
@@ -77,7 +80,7 @@ class Composer:
             coefficients: (R, m) shares of the examples in each subregion; rows sum to 1.
             motion: of the head, from the neutral photo to the picture; none unless given.
             size: width and height of the picture; the neutral photo's unless given. Beyond its
-                edges the neutral photo goes on as it is there.
+                edges the neutral photo goes on as `with_surroundings` has it.
             out: memory to draw into.
         Returns: (h, w, 3) sRGB; the same in any number of threads.
         Raises: InputError: shapes, NaN, rows that do not sum to 1.
@@ -104,6 +107,11 @@ class Composer:
         frame = self._frame if motion is None else motion(self._frame)
         return np.concatenate([points, frame])
 
+    @cached_property
+    def _larger(self) -> tuple[UInt8[Array, "k l 3"], int]:
+        """For heads that move: the neutral photo with its surroundings, and by how many px."""
+        return with_surroundings(self._neutral)
+
     def _background(
         self,
         motion: PlanarMotion | None,
@@ -128,7 +136,9 @@ class Composer:
         corners = np.array([[0.5, 0.5], [1.5, 0.5], [0.5, 1.5]])
         start, right, down = (corners if motion is None else motion(corners)) - 0.5
         matrix = np.stack([right - start, down - start, start], axis=1)
-        cv2.warpAffine(self._neutral, matrix, (width, height), out, borderMode=cv2.BORDER_REPLICATE)
+        larger, margin = self._larger
+        matrix[:, 2] -= margin * matrix[:, :2].sum(axis=1)
+        cv2.warpAffine(larger, matrix, (width, height), out, borderMode=cv2.BORDER_REPLICATE)
         return out
 
     def _mixtures(self, coefficients: Float[Array, "r m"]) -> Mixtures:

@@ -1,0 +1,81 @@
+"""What is around a photo: nobody knows, and nothing there should catch the eye."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mien.arrays import Array, Float, Int, UInt8
+
+__all__ = ["with_surroundings"]
+
+_MARGIN = 0.25
+"""Of the photo's longer side. From there on colours are repeated, and hardly differ."""
+_SOFTNESS = 0.5
+"""Deviation of the blur, in distances from the edge."""
+
+
+def with_surroundings(photo: UInt8[Array, "h w 3"]) -> tuple[UInt8[Array, "k l 3"], int]:
+    """A photo, and around it its edge, which is repeated and gets the softer the farther it is.
+
+    Pixels of the edge that are merely repeated are stripes: under shoulders, over a hairdo. Here
+    they are blurred along the edge, the more the farther away, and not at all beside the photo.
+
+    Returns: the larger picture; how many px were put on each side.
+    """
+    height, width = photo.shape[:2]
+    margin = int(np.ceil(_MARGIN * max(height, width)))
+    softer = _blurred(_edge(photo), levels=int(np.ceil(np.log2(1 + margin))) + 1)
+    larger = np.empty((height + 2 * margin, width + 2 * margin, 3), np.uint8)
+    inner = slice(margin, margin + height), slice(margin, margin + width)
+    larger[inner] = photo
+    rows, columns = np.arange(-margin, height + margin), np.arange(-margin, width + margin)
+    before, after = slice(margin), (slice(margin + height, None), slice(margin + width, None))
+    strips = [
+        (before, slice(None)),
+        (after[0], slice(None)),
+        (inner[0], before),
+        (inner[0], after[1]),
+    ]
+    for strip in strips:
+        larger[strip] = _looked_up(softer, rows[strip[0], None], columns[strip[1]], height, width)
+    return larger, margin
+
+
+def _edge(photo: UInt8[Array, "h w 3"]) -> UInt8[Array, "p 3"]:
+    """All pixels along the edge, clockwise from the top-left corner; corners count twice."""
+    return np.concatenate([photo[0], photo[:, -1], photo[-1, ::-1], photo[::-1, 0]])
+
+
+def _blurred(edge: UInt8[Array, "p 3"], levels: int) -> Float[Array, "levels p 3"]:
+    """The edge as it is 0, 1, 3, 7, ... px away; a closed line, so that corners are soft."""
+    deviations = _SOFTNESS * (2.0 ** np.arange(levels) - 1)
+    waves = np.fft.rfftfreq(len(edge))
+    kept = np.exp(-2 * (np.pi * deviations[:, None] * waves) ** 2)
+    soft = np.fft.irfft(kept[..., None] * np.fft.rfft(edge, axis=0), len(edge), axis=1)
+    return soft.astype(np.float32)
+
+
+def _looked_up(
+    softer: Float[Array, "levels p 3"],
+    rows: Int[Array, "k 1"],
+    columns: Int[Array, " l"],
+    height: int,
+    width: int,
+) -> UInt8[Array, "k l 3"]:
+    """Colours of px outside of the photo, of which the nearest px of the edge are seen."""
+    y, x = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
+    round_corner = width + height
+    place = np.select(
+        [rows < 0, columns >= width, rows >= height],
+        [x + 0 * rows, width + y + 0 * columns, round_corner + width - 1 - x + 0 * rows],
+        round_corner + width + height - 1 - y,
+    )
+    far = np.maximum(np.abs(rows - y), np.abs(columns - x))
+    level = np.log2(1 + far).astype(np.float32)
+    lower = level.astype(int)
+    share = (level - lower)[..., None]
+    upper = np.minimum(lower + 1, len(softer) - 1)
+    mixed = softer[lower, place]
+    mixed += share * (softer[upper, place] - mixed)
+    colours: Array = np.rint(mixed).clip(0, 255).astype(np.uint8)
+    return colours
