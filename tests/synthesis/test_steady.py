@@ -68,13 +68,14 @@ def test_a_face_that_is_not_found_again_stays(seen, photo):
 
 
 def test_points_of_a_large_picture_are_not_shifted(seen):
-    """Reduced by 0.4266 it is 426.6 px wide, for which 427 stand; three marks tell where it is."""
-    marks = np.array([[150.5, 300.5], [850.5, 350.5], [450.5, 1650.5]])
+    """Reduced, it is 429.4 px wide, for which 429 stand; three marks tell where a view is."""
+    marks = np.array([[300.5, 1000.5], [750.5, 1100.5], [450.5, 1550.5]])
     picture = np.zeros((1777, 1000, 3), np.uint8)
     for channel, (x, y) in enumerate(marks.astype(int)):
         picture[y - 10 : y + 11, x - 10 : x + 11, channel] = 255
     face = seen[0][0]
     landmarks = (face - face.min(axis=0)) * (400 / np.ptp(face[:, 0])) + [300, 1000]
+    looks = []
 
     def look(view):
         places = np.indices(view.shape[:2])[::-1] + 0.5
@@ -82,10 +83,12 @@ def test_points_of_a_large_picture_are_not_shifted(seen):
         if not (sums := weights.sum(axis=(0, 1))).all():
             return None
         found = np.einsum("dyx,yxc->cd", places, weights) / sums[:, None]
+        looks.append(view)
         to_view = np.linalg.solve(np.column_stack([marks, np.ones(3)]), found)
         return SimpleNamespace(points=np.column_stack([landmarks, np.ones(478)]) @ to_view)
 
     points = steady_points(LAYOUT, SimpleNamespace(detect_fast=look), picture, landmarks)
+    assert len(looks) == 6
     np.testing.assert_allclose(points, LAYOUT.from_landmarks(landmarks), atol=0.1)
 
 

@@ -210,6 +210,3 @@ def test_bad_options_and_points(person):
         synthesizer.complete(np.array([3, 3, 4]), np.zeros((3, 2)))
     with pytest.raises(EstimationError, match="share a place"):
         synthesizer.complete(np.array([3, 4, 5]), np.ones((3, 2)))
-    alone = Synthesizer(replace(person[0], statistics=person[0].statistics[:1]))
-    with pytest.raises(InputError, match="statistics: expected 2 expressions or more, got 1"):
-        alone.complete(np.array([3]), np.ones((1, 2)))
