@@ -52,7 +52,7 @@ def check_array(
     wanted = "(" + ", ".join("any" if length is None else str(length) for length in shape) + ")"
     try:
         array: Array = np.asarray(value, dtype=dtype)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(name, f"numbers of shape {wanted}", type(value).__name__) from None
     fits = array.ndim == len(shape) and all(
         length is None or length == actual

@@ -6,6 +6,8 @@ import csv
 import json
 import shutil
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from inspect import signature
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,8 @@ import pytest
 from PIL import Image
 
 from filmed import grey, written
-from mien.app.examples import gather_examples
+from mien.app.cli_examples import examples
+from mien.app.examples import ExampleRequest, gather_examples
 from mien.arrays import Array
 from mien.expressions.state import FaceState
 from mien.formats.example_folder import load_examples, read_reasons
@@ -192,3 +195,11 @@ def test_sources_and_places_that_cannot_be_used(
     ran = mien("examples", wall, "-o", tmp_path / "set", "--json")
     assert (ran.status, ran.err) == (2, f"error: {wall}: no face found in any of its frames\n")
     assert not (tmp_path / "set").exists()
+
+
+def test_the_command_and_the_library_ask_for_the_same() -> None:
+    """Options that are not given are those of a request."""
+    usual = {name: option.default for name, option in signature(examples).parameters.items()}
+    request = asdict(ExampleRequest())
+    assert {name: usual[name] or request[name] for name in request} == request
+    assert {name: usual[name] for name in ("count", "max_side", "even")}.items() <= request.items()

@@ -185,6 +185,7 @@ def _stored() -> dict[str, Any]:
             put("points", 8, "landmarks", to={"4": "x"}),
             "right_eye_inner.landmarks: expected a num",
         ),
+        (put("points", 8, "template", to=[10**400, 0]), "template: expected numbers of shape"),
         (put("points", 8, "landmarks", to={"4": 0.9}), "shares that sum to 1, found 0.9"),
         (put("sets", 1, to=[]), r"sets\[1\]: expected an object of lists of points"),
         (put("sets", 1, "nose_region", to=["x"]), r"sets\[1\].nose_region: unknown point 'x'"),

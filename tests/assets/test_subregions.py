@@ -191,6 +191,10 @@ def test_bad_calls_are_told(layout: FeatureLayout, points: np.ndarray) -> None:
         (put("regions", 0, "corners", 1, to=3), r"right_cheek.corners\[1\]: expected an object"),
         (put("regions", 0, "corners", 1, to={"nos": 1}), r"corners\[1\]: unknown point 'nos'"),
         (put("regions", 0, "corners", 1, to={"chin": 0.5}), "shares that sum to 1, found 0.5"),
+        (
+            put("regions", 0, "corners", 1, to={"chin": 10**400, "menton": 1 - 10**400}),
+            r"right_cheek.corners\[1\]: expected a number, found '1000",
+        ),
         (put("regions", 0, "corners", to=[]), "right_cheek.corners: expected at least 3, found 0"),
     ],
 )

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 from mien.errors import FileFormatError, InputError
 
 VERSION = 1
+_LARGEST_SHARE = 1e6
 
 _KINDS: dict[type, str] = {str: "text", int: "a whole number", list: "a list", dict: "an object"}
 _Kind = TypeVar("_Kind")
@@ -67,7 +68,9 @@ def shares(
         number = index(name)
         if number is None:
             raise Broken(place, f"unknown point {name[:40]!r}")
-        if isinstance(share, bool) or not isinstance(share, int | float):
+        # A share may lie outside of the hull, but whole numbers may have any number of digits.
+        number_like = isinstance(share, int | float) and not isinstance(share, bool)
+        if not number_like or abs(share) > _LARGEST_SHARE:
             raise Broken(place, f"expected a number, found {str(share)[:40]!r}")
         found[number] = float(share)
     if not abs(sum(found.values()) - 1) < 1e-6:

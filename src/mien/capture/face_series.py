@@ -105,15 +105,15 @@ def load_pictures(
             if report is not None:
                 report(number + 1, len(rows))
         return
-    row_of = {int(series.scores.index[row]): row for row in rows}
-    last = max(row_of, default=0)
+    by_frame = {int(series.scores.index[row]): row for row in rows}
+    last = max(by_frame, default=0)
     for index, photo in fetch_frames(
         Video(series.source),
-        row_of,
+        by_frame,
         series.max_side,
         lambda frame: None if report is None else report(frame + 1, last + 1),
     ):
-        yield row_of[index], photo
+        yield by_frame[index], photo
 
 
 class _Gathered:

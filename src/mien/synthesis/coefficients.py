@@ -16,6 +16,7 @@ __all__ = [
     "BROWS",
     "DISTANCE_PENALTY",
     "UPPER_FACE",
+    "apart_from",
     "coefficients",
     "coefficients_of",
     "distances_of",
@@ -76,7 +77,7 @@ def coefficients(
     Source: Z06 section 6, eq. (2) to (5).
     """
     return coefficients_of(
-        _apart(example_set, points),
+        apart_from(example_set, points),
         example_set.subregions,
         distance_penalty=distance_penalty,
         slack=slack,
@@ -129,7 +130,11 @@ def coefficients_of(
 
 
 def _share_of(squares: Float[Array, " m"], used: Sequence[int]) -> float:
-    """How much of a subregion some examples make alone: all where they are three times as near."""
+    """How much of a subregion some examples make alone, by the squared distance of the nearest.
+
+    All where that of the others is three times theirs, half where both are as near, and nothing
+    where it is a third.
+    """
     if not used:
         return 0.0
     others = np.delete(squares, used)
@@ -185,13 +190,18 @@ def hull_distances(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Floa
         photo.
     Raises: as `coefficients`.
     """
-    apart = _apart(example_set, points)
+    apart = apart_from(example_set, points)
     shares = coefficients_of(apart, example_set.subregions, distance_penalty=0.0, together=())
     return distances_of(apart, shares, example_set.subregions)
 
 
-def _apart(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Float[Array, "m n 2"]:
-    """The examples' geometries relative to the one asked for."""
+def apart_from(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Float[Array, "m n 2"]:
+    """The examples' geometries relative to the one asked for, px of the neutral photo.
+
+    Args:
+        points: (n, 2) px of any photo.
+    Raises: InputError: shape, NaN. EstimationError: all points in one place.
+    """
     points = check_array("points", points, (len(example_set.layout.names), 2))
     apart: Array = example_set.geometries - example_set.geometry(points)
     return apart

@@ -12,7 +12,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int, UInt8, check_array, frozen
 from mien.errors import InputError
 from mien.numeric.planar_motion import PlanarMotion, estimate_planar_motion
-from mien.synthesis.coefficients import DISTANCE_PENALTY, coefficients, distances_of
+from mien.synthesis.coefficients import DISTANCE_PENALTY, apart_from, coefficients, distances_of
 from mien.synthesis.compose import Composer
 from mien.synthesis.conditional import ConditionalMotion
 from mien.synthesis.examples import ExampleSet
@@ -64,7 +64,11 @@ class SynthesisOptions:
 
     @classmethod
     def paper(cls) -> SynthesisOptions:
-        """Exactly what Z06 prints."""
+        """What Z06 prints.
+
+        What has no switch stays: teeth of a shut mouth come from all examples, and the printed
+        propagation keeps more components (`propagate.COMPONENTS`).
+        """
         return cls(distance_penalty=0.0, slack=0.0, together=(), propagation="printed")
 
 
@@ -171,8 +175,7 @@ class Synthesizer:
             together=self.options.together,
         )
         image = self._composer.render(points, shares, motion=motion, size=size, out=out)
-        apart = examples.geometries - examples.geometry(points)
-        missed = distances_of(apart, shares, examples.subregions)
+        missed = distances_of(apart_from(examples, points), shares, examples.subregions)
         return Synthesis(image, frozen(np.array(points, float)), frozen(shares), frozen(missed))
 
     def _inference(self, known: Int[Array, " k"], told: bool) -> Inference:
