@@ -96,6 +96,14 @@ def test_no_face(detector: LandmarkDetector, as_photo: AsPhoto) -> None:
         detector.detect(as_photo(ramp, "wall.png"))
 
 
+@pytest.mark.parametrize("size", [(1, 1), (1, 300), (2, 3)])
+def test_a_picture_of_hardly_any_pixels(
+    detector: LandmarkDetector, as_photo: AsPhoto, size: tuple[int, int]
+) -> None:
+    with pytest.raises(EstimationError, match=r"^dot\.png: no face found"):
+        detector.detect(as_photo(np.full((*size, 3), 90, np.uint8), "dot.png"))
+
+
 def test_several_faces(
     detector: LandmarkDetector, faces: dict[str, Array], as_photo: AsPhoto
 ) -> None:

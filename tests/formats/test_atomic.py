@@ -11,6 +11,7 @@ from mien.formats.atomic import (
     atomic_file,
     atomic_folder,
     check_file_place,
+    check_files_apart,
     check_folder_place,
 )
 
@@ -117,6 +118,15 @@ class TestFile:
             check_file_place(tmp_path)
         with pytest.raises(InputError, match="expected a place that can be written to, got"):
             check_file_place(tmp_path / "old" / "below")
+
+    def test_what_is_read_is_not_written_over(self, tmp_path: Path) -> None:
+        photo, picture = tmp_path / "a.jpg", tmp_path / "b.png"
+        photo.write_text("photo")
+        (tmp_path / "link.jpg").symlink_to(photo)
+        check_files_apart([picture, tmp_path / "W.json"], [photo])
+        for written in ([photo], [tmp_path / "link.jpg"], [picture, tmp_path / "." / "b.png"]):
+            with pytest.raises(InputError, match="expected a place of its own, got a file that is"):
+                check_files_apart(written, [photo])
 
     def test_errors_of_other_files_pass_through(self, tmp_path: Path) -> None:
         with pytest.raises(FileNotFoundError), atomic_file(tmp_path / "result"):

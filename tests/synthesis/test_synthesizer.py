@@ -201,6 +201,8 @@ def test_bad_options_and_points(person):
         SynthesisOptions(propagation="pca")
     with pytest.raises(InputError, match=r"slack: expected a number of 0 or more, got -0\.1"):
         SynthesisOptions(slack=-0.1)
+    with pytest.raises(InputError, match=r"slack: expected a share, from 0 to 1, got 1e\+300"):
+        SynthesisOptions(slack=1e300)
     with pytest.raises(InputError, match="distance_penalty: expected finite numbers, got nan"):
         SynthesisOptions(distance_penalty=np.nan)
     synthesizer = Synthesizer(person[0])

@@ -117,6 +117,8 @@ class LandmarkDetector:
         """A face too small to be seen in the whole: nine overlapping halves."""
         height, width = photo.pixels.shape[:2]
         faces: list[DetectedFace] = []
+        if min(height, width) < 2:
+            return None
         for top in (0, height // 4, height // 2):
             for left in (0, width // 4, width // 2):
                 part = photo.pixels[top : top + height // 2, left : left + width // 2]

@@ -10,7 +10,7 @@ import errno
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -63,6 +63,18 @@ def check_file_place(path: str | Path) -> None:
     """
     with suppress(_NothingWritten), atomic_file(path):
         raise _NothingWritten
+
+
+def check_files_apart(written: Iterable[str | Path], read: Iterable[str | Path] = ()) -> None:
+    """Refuse to write over what is read, and two results to one place.
+
+    Raises: InputError: names the place.
+    """
+    taken = {Path(path).resolve() for path in read}
+    for path in written:
+        if Path(path).resolve() in taken:
+            raise InputError(path, "a place of its own", "a file that is read or written as well")
+        taken.add(Path(path).resolve())
 
 
 @contextmanager

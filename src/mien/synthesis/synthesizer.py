@@ -46,7 +46,8 @@ class SynthesisOptions:
         distance_penalty, slack, together: as for `coefficients`.
         propagation: how all points come from some: "closed-form" is the one that was measured
             better, "printed" the paper's.
-    Raises: InputError: another name of a propagation, a penalty or slack that is no number from 0.
+    Raises: InputError: another name of a propagation, a penalty or slack that is no number from 0;
+        a slack above 1.
     """
 
     distance_penalty: float = DISTANCE_PENALTY
@@ -60,6 +61,8 @@ class SynthesisOptions:
             value = float(check_array(name, getattr(self, name), ()))
             if value < 0:
                 raise InputError(name, "a number of 0 or more", value)
+        if self.slack > 1:
+            raise InputError("slack", "a share, from 0 to 1", self.slack)
         _checked(self.propagation, PropagationName, "propagation")
 
     @classmethod
