@@ -19,7 +19,7 @@ from mien.capture.detector import LandmarkDetector
 from mien.capture.photos import Photo
 from mien.formats.example_folder import write_examples
 from mien.formats.image import load_image
-from mien.formats.points_json import write_points_json
+from mien.formats.points_json import read_points_json, write_points_json
 from mien.formats.pts import points_to_ibug, write_pts
 from mien.formats.tem import points_to_tem, write_tem
 from mien.synthesis.examples import Example, ExampleSet
@@ -101,6 +101,31 @@ def test_three_points_are_enough(
     ran = mien("synthesize", folder, "-o", tmp_path / "o.png", "--points", asked(neutral, *names))
     assert ran.status == 0
     assert ran.out == f"{tmp_path / 'o.png'}: {SIZE[0]}x{SIZE[1]}\n"
+
+
+def test_all_points_are_saved_and_can_be_asked_for_again(
+    mien: Mien, folder: Path, asked: Asked, neutral: Array, tmp_path: Path
+) -> None:
+    names = ("right_mouth_corner", "left_mouth_corner", "menton")
+    neutral[LAYOUT.index("menton")] += [0, 3]
+    first, again, saved = tmp_path / "a.png", tmp_path / "b.png", tmp_path / "S.json"
+    path = asked(neutral, *names)
+    mien("synthesize", folder, "-o", first, "--points", path, "--save-points", saved)
+    points = read_points_json(saved, LAYOUT)
+    assert list(points) == list(LAYOUT.names)
+    np.testing.assert_allclose(points["menton"], neutral[LAYOUT.index("menton")], atol=1e-3)
+    mien("synthesize", folder, "-o", again, "--points", saved, "--head", "still")
+    assert np.abs(load_image(first).astype(float) - load_image(again)).mean() < 0.2
+
+
+def test_a_place_for_points_is_refused_before_the_work(
+    mien: Mien, folder: Path, asked: Asked, neutral: Array, tmp_path: Path
+) -> None:
+    path, out = asked(neutral), tmp_path / "o.png"
+    ran = mien("synthesize", folder, "-o", out, "--points", path, "--save-points", "P.txt")
+    assert ran.status == 2
+    assert "P.txt: expected a name that ends in .json, .tem, .pts, got .txt" in ran.err
+    assert not out.exists()
 
 
 @pytest.mark.parametrize("suffix", [".tem", ".pts"])

@@ -10,10 +10,9 @@ import pytest
 
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.errors import FileFormatError, InputError
-from mien.formats.points_file import read_points
+from mien.formats.points_file import read_points, write_points
 from mien.formats.points_json import read_points_json, write_points_json
-from mien.formats.pts import points_to_ibug, write_pts
-from mien.formats.tem import points_to_tem, write_tem
+from mien.formats.pts import write_pts
 
 
 @pytest.fixture(scope="module")
@@ -99,9 +98,8 @@ def test_files_of_all_kinds(
     tmp_path: Path, layout: FeatureLayout, rng: np.random.Generator
 ) -> None:
     points = np.round(rng.uniform(0, 500, (len(layout.names), 2)), 3)
-    write_points_json(tmp_path / "a.json", layout, dict(zip(layout.names, points, strict=True)))
-    write_tem(tmp_path / "a.tem", points_to_tem(layout, points))
-    write_pts(tmp_path / "a.PTS", points_to_ibug(layout, points))
+    for name in ("a.json", "a.tem", "a.PTS"):
+        write_points(tmp_path / name, layout, points)
     for name, count in (("a.json", len(points)), ("a.tem", len(points)), ("a.PTS", 27)):
         known, positions = read_points(tmp_path / name, layout)
         assert len(known) == len(positions) >= count
@@ -112,6 +110,8 @@ def test_files_of_all_kinds(
 def test_files_of_other_kinds(tmp_path: Path, layout: FeatureLayout) -> None:
     with pytest.raises(InputError, match=r"a.txt: expected a name that ends in .json, .tem, .pts"):
         read_points(tmp_path / "a.txt", layout)
+    with pytest.raises(InputError, match=r"a.png: expected a name that ends in .json, .tem, .pts"):
+        write_points(tmp_path / "a.png", layout, np.zeros((len(layout.names), 2)))
     with pytest.raises(InputError, match=r"none.json: expected a readable file"):
         read_points(tmp_path / "none.json", layout)
     write_pts(tmp_path / "a.pts", np.zeros((5, 2)))

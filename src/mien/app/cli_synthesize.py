@@ -36,6 +36,10 @@ def synthesize(
         Path | None,
         typer.Option(help="W.json: which examples made which subregion, in which share."),
     ] = None,
+    save_points: Annotated[
+        Path | None,
+        typer.Option(help="Of examples: .json, .tem or .pts: all feature points of the picture."),
+    ] = None,
     head: Annotated[
         Literal["auto", "still", "moved"],
         typer.Option(
@@ -93,7 +97,8 @@ def synthesize(
     options = _options(paper, propagation, distance_penalty, slack, upper_face_as_one)
     view = {"--yaw": yaw, "--pitch": pitch, "--size": size, "--background": background}
     if is_head_folder(examples):
-        _refuse({"--head": None if head == "auto" else head, "--face": face}, "a set of examples")
+        wrong = {"--head": None if head == "auto" else head, "--face": face}
+        _refuse(wrong | {"--save-points": save_points}, "a set of examples")
         _of_head(examples, output, points, photo, weights, options, not paper, view, json_)
         return
     _refuse(view, "a head folder")
@@ -104,6 +109,7 @@ def synthesize(
             points=points,
             photo=photo,
             weights=weights,
+            save_points=save_points,
             options=options,
             head=head,
             face=face,

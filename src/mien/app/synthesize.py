@@ -11,6 +11,7 @@ from mien.errors import InputError
 from mien.formats.atomic import check_file_place
 from mien.formats.example_folder import load_examples
 from mien.formats.image import image_kind, save_image
+from mien.formats.points_file import check_points_place, write_points
 from mien.formats.weights_json import write_weights
 from mien.synthesis.examples import ExampleSet
 from mien.synthesis.plausible import face_width
@@ -54,6 +55,7 @@ def synthesize_expression(
     points: str | Path | None = None,
     photo: str | Path | None = None,
     weights: str | Path | None = None,
+    save_points: str | Path | None = None,
     options: SynthesisOptions | None = None,
     head: HeadChoice = "auto",
     face: int | None = None,
@@ -66,6 +68,7 @@ def synthesize_expression(
         points: a file of feature points, px of the neutral photo; or
         photo: whose face has the expression; the picture gets its size, and the head its place.
         weights: W.json, which examples made which subregion.
+        save_points: .json, .tem or .pts: where all points are, px of the picture.
         head: of `points`, as for `target_from_points`.
         face: of `photo`, which one; the largest unless given.
         progress: told the stage, steps done and their total.
@@ -78,6 +81,8 @@ def synthesize_expression(
     image_kind(output)
     for path in (output, *([weights] if weights else [])):
         check_file_place(path)
+    if save_points is not None:
+        check_points_place(save_points)
     tell(READING, 0, 0)
     synthesizer = Synthesizer(load_examples(folder), options)
     tell(READING, 1, 1)
@@ -93,6 +98,8 @@ def synthesize_expression(
     if weights is not None:
         shares, hull_px = made.synthesis.coefficients, made.synthesis.hull_px
         write_weights(weights, synthesizer.examples, shares, hull_px)
+    if save_points is not None:
+        write_points(save_points, synthesizer.examples.layout, made.synthesis.points)
     tell(DRAWING, 1, 1)
     return made
 

@@ -7,14 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from mien.arrays import Array, Float, Int
+from mien.arrays import Array, Float, Int, check_array
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import FileFormatError, InputError
-from mien.formats.points_json import read_points_json
-from mien.formats.pts import IBUG_COUNT, points_from_ibug, read_pts
-from mien.formats.tem import points_from_tem, read_tem
+from mien.formats.atomic import check_file_place
+from mien.formats.points_json import read_points_json, write_points_json
+from mien.formats.pts import IBUG_COUNT, points_from_ibug, points_to_ibug, read_pts, write_pts
+from mien.formats.tem import points_from_tem, points_to_tem, read_tem, write_tem
 
-__all__ = ["read_points"]
+__all__ = ["check_points_place", "read_points", "write_points"]
 
 Named = dict[str, Float[Array, " 2"]]
 
@@ -31,12 +32,45 @@ def read_points(
         ending says; another layout or template; says where.
     """
     path = Path(path)
-    read = _READERS.get(path.suffix.lower())
-    if read is None:
-        expected = f"a name that ends in {', '.join(_READERS)}"
-        raise InputError(path, expected, path.suffix or "no suffix")
+    read = _READERS[_kind(path)]
     named = sorted((layout.index(name), place) for name, place in read(path, layout).items())
     return np.array([index for index, _ in named]), np.array([place for _, place in named])
+
+
+def check_points_place(path: str | Path) -> None:
+    """Refuse a place for points before the work is done. Raises: InputError: ending, the place."""
+    _kind(Path(path))
+    check_file_place(path)
+
+
+def write_points(path: str | Path, layout: FeatureLayout, points: Float[Array, "n 2"]) -> None:
+    """Write all points of a layout, px, in the way that the file's ending tells.
+
+    Args:
+        path: `.json`, by name; `.tem`, in the layout's order; `.pts`, iBUG's 68.
+    Raises: InputError: another ending, shape, NaN, the place.
+    """
+    path = Path(path)
+    _WRITERS[_kind(path)](path, layout, check_array("points", points, (len(layout.names), 2)))
+
+
+def _kind(path: Path) -> str:
+    kind = path.suffix.lower()
+    if kind not in _READERS:
+        raise InputError(path, f"a name that ends in {', '.join(_READERS)}", kind or "no suffix")
+    return kind
+
+
+def _to_json(path: Path, layout: FeatureLayout, points: Float[Array, "n 2"]) -> None:
+    write_points_json(path, layout, dict(zip(layout.names, points, strict=True)))
+
+
+def _to_tem(path: Path, layout: FeatureLayout, points: Float[Array, "n 2"]) -> None:
+    write_tem(path, points_to_tem(layout, points))
+
+
+def _to_pts(path: Path, layout: FeatureLayout, points: Float[Array, "n 2"]) -> None:
+    write_pts(path, points_to_ibug(layout, points))
 
 
 def _from_tem(path: Path, layout: FeatureLayout) -> Named:
@@ -54,4 +88,9 @@ _READERS: dict[str, Callable[[Path, FeatureLayout], Named]] = {
     ".json": read_points_json,
     ".tem": _from_tem,
     ".pts": _from_pts,
+}
+_WRITERS: dict[str, Callable[[Path, FeatureLayout, Float[Array, "n 2"]], None]] = {
+    ".json": _to_json,
+    ".tem": _to_tem,
+    ".pts": _to_pts,
 }
