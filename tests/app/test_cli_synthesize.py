@@ -192,6 +192,20 @@ def test_another_persons_photo_is_used_and_told_of(
     assert "its points are taken as they are" in ran.err
 
 
+def test_a_face_that_the_photo_cuts_is_told_of(
+    mien: Mien, folder: Path, james_set: ExampleSet, tmp_path: Path
+) -> None:
+    """Through the mouth: the chin is a guess, the brows are not."""
+    row = int(james_set.neutral.points[LAYOUT.index("upper_lip_outer"), 1])
+    Image.fromarray(james_set.neutral.photo[:row]).save(tmp_path / "cut.png")
+    ran = mien("synthesize", folder, "-o", tmp_path / "o.png", "--photo", tmp_path / "cut.png")
+    assert "cut.png: the edge cuts the face, " in ran.err
+    assert "points lie outside of the picture, " in ran.err
+    Image.fromarray(james_set.neutral.photo).save(tmp_path / "whole.png")
+    ran = mien("synthesize", folder, "-o", tmp_path / "o.png", "--photo", tmp_path / "whole.png")
+    assert "the edge cuts" not in ran.err
+
+
 def test_marks_beside_a_photo_win(
     mien: Mien, folder: Path, james_set: ExampleSet, tmp_path: Path
 ) -> None:
@@ -343,3 +357,31 @@ def test_neither_both_and_nothing_to_work_with(
     error = mien("synthesize", folder, "-o", out, "--points", path, "--slack", "-1", "--json").error
     assert error == "slack: expected a number of 0 or more, got -1.0"
     assert not out.exists()
+
+
+def test_what_is_read_is_not_written_over(
+    mien: Mien, folder: Path, asked: Asked, neutral: Array, tmp_path: Path
+) -> None:
+    path, out, photo = asked(neutral), tmp_path / "o.png", tmp_path / "a.png"
+    photo.write_bytes((folder / "photos" / "e0.png").read_bytes())
+    before = (path.read_bytes(), photo.read_bytes())
+    for options in (
+        ("-o", out, "--points", path, "--weights", path),
+        ("-o", out, "--points", path, "--weights", out),
+        ("-o", out, "--points", path, "--save-points", path),
+        ("-o", photo, "--photo", photo),
+    ):
+        error = mien("synthesize", folder, *options, "--json").error
+        assert "expected a place of its own, got a file that is read or written as well" in error
+    assert (path.read_bytes(), photo.read_bytes()) == before
+    assert not out.exists()
+
+
+def test_options_of_the_other_way(
+    mien: Mien, folder: Path, asked: Asked, neutral: Array, tmp_path: Path
+) -> None:
+    ask = ("synthesize", folder, "-o", tmp_path / "o.png", "--json")
+    error = mien(*ask, "--points", asked(neutral), "--face", "1").error
+    assert error == "--face: expected this only with --photo, got 1"
+    error = mien(*ask, "--photo", folder / "photos" / "e0.png", "--head", "still").error
+    assert error == "--head: expected this only with --points, got still"

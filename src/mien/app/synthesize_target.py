@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -10,7 +11,7 @@ import numpy as np
 
 from mien.app.example_marks import read_marks, with_marks
 from mien.arrays import Array, Float, Int
-from mien.capture.photos import load_photo
+from mien.capture.photos import Photo, load_photo
 from mien.errors import EstimationError, InputError
 from mien.formats.points_file import read_points
 from mien.numeric.planar_motion import PlanarMotion
@@ -97,7 +98,8 @@ def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int |
         detected = steady_points(layout, detector, photo.pixels, landmarks.points)
     points = with_marks(layout, detected, read_marks(Path(path), photo, layout))
     motion = synthesizer.head_motion(points)
-    notes = [*photo.notes, *landmarks.notes, *_stranger_notes(synthesizer, path, points)]
+    notes = [*photo.notes, *landmarks.notes, *_cut_notes(synthesizer, photo, path, points)]
+    notes += _stranger_notes(synthesizer, path, points)
     if motion.scale > _LARGER:
         times = f"{float(motion.scale):.1f} times as large as in the examples"
         notes.append(f"{path}: the face is {times}: the picture is as soft as they are")
@@ -123,18 +125,38 @@ def _outside_notes(
     """That some points lie outside of the picture. Raises: InputError: far outside."""
     layout, neutral = synthesizer.examples.layout, synthesizer.examples.neutral
     height, width = neutral.photo.shape[:2]
-    beyond = np.maximum(-positions, positions - [width, height]).max(axis=1)
+    beyond = _beyond(positions, (width, height))
     worst = int(beyond.argmax())
-    name = layout.names[known[worst]]
     if beyond[worst] > _FAR * face_width(layout, neutral.points):
         expected = f"px of the neutral photo, which is {width}x{height}"
         place = ", ".join(f"{number:g}" for number in positions[worst])
-        raise InputError(path, expected, f"{name} at {place}")
-    if beyond[worst] <= 0:
-        return ()
+        raise InputError(path, expected, f"{layout.names[known[worst]]} at {place}")
+    told = _told_outside(layout.names, known, beyond)
+    return (f"{path}: {told}",) if told else ()
+
+
+def _cut_notes(
+    synthesizer: Synthesizer, photo: Photo, path: str | Path, points: Float[Array, "n 2"]
+) -> tuple[str, ...]:
+    """That the photo's edge cuts the face."""
+    names = synthesizer.examples.layout.names
+    told = _told_outside(names, np.arange(len(names)), _beyond(points, photo.size))
+    return (f"{path}: the edge cuts the face, {told}: they are a guess",) if told else ()
+
+
+def _beyond(points: Float[Array, "k 2"], size: tuple[int, int]) -> Float[Array, " k"]:
+    """How far points lie outside of a picture, px; below 0 inside."""
+    far: Array = np.maximum(-points, points - size).max(axis=1)
+    return far
+
+
+def _told_outside(
+    names: Sequence[str], known: Int[Array, " k"], beyond: Float[Array, " k"]
+) -> str | None:
     count = int((beyond > 0).sum())
-    told = f"{count} of {len(known)} points lie outside of the picture, {name} farthest"
-    return (f"{path}: {told}",)
+    farthest = names[known[int(beyond.argmax())]]
+    told = f"{count} of {len(known)} points lie outside of the picture, {farthest} farthest"
+    return told if count else None
 
 
 def _stranger_notes(
