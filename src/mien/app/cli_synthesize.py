@@ -102,6 +102,10 @@ def synthesize(
         _of_head(examples, output, points, photo, weights, options, not paper, view, json_)
         return
     _refuse(view, "a head folder")
+    if photo is None:
+        _refuse({"--face": face}, "--photo")
+    elif points is None:
+        _refuse({"--head": None if head == "auto" else head}, "--points")
     with terminal_progress(json_) as progress:
         made = synthesize_expression(
             examples,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from mien.app.synthesize_target import HeadChoice, Target, target_from_photo, target_from_points
 from mien.errors import InputError
-from mien.formats.atomic import check_file_place
+from mien.formats.atomic import check_file_place, check_files_apart
 from mien.formats.example_folder import load_examples
 from mien.formats.image import image_kind, save_image
 from mien.formats.points_file import check_points_place, write_points
@@ -79,6 +79,8 @@ def synthesize_expression(
     tell = progress or (lambda stage, done, total: None)
     _check_request(points, photo)
     image_kind(output)
+    written = [path for path in (output, weights, save_points) if path is not None]
+    check_files_apart(written, [path for path in (points, photo) if path is not None])
     for path in (output, *([weights] if weights else [])):
         check_file_place(path)
     if save_points is not None:

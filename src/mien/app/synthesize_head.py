@@ -11,7 +11,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import InputError
-from mien.formats.atomic import check_file_place
+from mien.formats.atomic import check_file_place, check_files_apart
 from mien.formats.head_folder import load_head
 from mien.formats.image import image_kind, save_image
 from mien.formats.points_json import read_points_json
@@ -100,6 +100,8 @@ def synthesize_head(
         expected = "--points FILE or --photo FILE: where the expression's points are"
         raise InputError("mien synthesize", expected, "neither" if points is None else "both")
     image_kind(output)
+    written = [path for path in (output, weights) if path is not None]
+    check_files_apart(written, [path for path in (points, photo) if path is not None])
     check_file_place(output)
     if weights is not None:
         check_file_place(weights)
