@@ -163,15 +163,7 @@ def gather_examples(
     video = series.source.name if series.is_video else ""
     examples, why = build_examples(plan, photos, source=video, even=request.even)
     pictures = dict(zip(plan.names, plan.choice.reasons, strict=True)) | series.left_out
-    changed = [
-        example.photo is not photos[row].pixels
-        for example, row in zip(examples.examples, rows, strict=True)
-    ]
-    notes = [*series.notes, *_notes(plan, series, marks)]
-    if any(changed):
-        notes.append(f"exposure of {sum(changed)} examples brought to that of the face at rest")
-    if len(rows) == 1:
-        notes.append("one example alone shows no expression but its own")
+    notes = [*series.notes, *_notes(plan, series, marks), *_set_notes(examples, photos, rows)]
     return GatheredExamples(examples, why, tuple(sorted(pictures.items())), tuple(notes))
 
 
@@ -224,6 +216,18 @@ def _notes(plan: ExamplePlan, series: FaceSeries, marks: dict[int, Marks]) -> li
     kinds = ("chosen", *KINDS.values(), NO_FACE)
     told = [f"{counts[kind]} {kind}" for kind in kinds if counts[kind]]
     notes.append(f"of {len(series) + len(series.left_out)} pictures {', '.join(told)}")
+    return notes
+
+
+def _set_notes(examples: ExampleSet, photos: Mapping[int, Photo], rows: Sequence[int]) -> list[str]:
+    """What was done to the examples' photos, and what they cannot do."""
+    pairs = zip(examples.examples, rows, strict=True)
+    changed = sum(example.photo is not photos[row].pixels for example, row in pairs)
+    notes = []
+    if changed:
+        notes.append(f"exposure of {changed} examples brought to that of the face at rest")
+    if len(rows) == 1:
+        notes.append("one example alone shows no expression but its own")
     return notes
 
 
