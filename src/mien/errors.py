@@ -39,3 +39,11 @@ class FileFormatError(MienError):
 
 class EstimationError(MienError):
     """The data cannot answer the question, whoever asks; the message says why."""
+
+
+class Broken(Exception):
+    """Something else than expected at a place of a document; whoever reads the file names it."""
+
+    def __init__(self, place: str, problem: str) -> None:
+        self.place, self.problem = place, problem
+        super().__init__(f"{place}: {problem}")

@@ -7,21 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from mien.errors import FileFormatError, InputError
+from mien.errors import Broken, FileFormatError, InputError
 
 VERSION = 1
 _LARGEST_SHARE = 1e6
 
 _KINDS: dict[type, str] = {str: "text", int: "a whole number", list: "a list", dict: "an object"}
 _Kind = TypeVar("_Kind")
-
-
-class Broken(Exception):
-    """Something else than expected at a place of the document; `read_data` adds the file."""
-
-    def __init__(self, place: str, problem: str) -> None:
-        self.place, self.problem = place, problem
-        super().__init__(f"{place}: {problem}")
 
 
 def read_data(path: Path, format_name: str, build: Callable[[dict[str, Any]], _Kind]) -> _Kind:

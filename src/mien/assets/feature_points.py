@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array, frozen
-from mien.assets.data_file import Broken, need, read_data, shares
-from mien.errors import InputError
+from mien.assets.data_file import need, read_data, shares
+from mien.errors import Broken, InputError
 from mien.numeric.planar_motion import estimate_planar_motion
 
 __all__ = ["FeatureLayout", "load_feature_layout"]

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int, check_array, frozen
-from mien.assets.data_file import Broken, need, read_data, shares
+from mien.assets.data_file import need, read_data, shares
 from mien.assets.feature_points import FeatureLayout
-from mien.errors import InputError
+from mien.errors import Broken, InputError
 
 __all__ = ["SubregionDrawing", "Subregions", "default_subregions", "load_subregion_drawing"]
 

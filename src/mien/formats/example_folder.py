@@ -14,7 +14,7 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.assets.subregions import Subregions, default_subregions
-from mien.errors import FileFormatError, InputError
+from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_folder, check_folder_place
 from mien.formats.example_json import (
     FORMAT,
@@ -27,7 +27,7 @@ from mien.formats.example_json import (
     photo_from_json,
     points_from_json,
 )
-from mien.formats.head_json import Broken, is_inside
+from mien.formats.head_json import is_inside
 from mien.formats.image import encode_image, load_image
 from mien.formats.npz import read_arrays
 from mien.formats.strict_json import as_list, as_object, as_text, check_format, need, read_json

@@ -9,7 +9,8 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.assets.feature_points import FeatureLayout
-from mien.formats.head_json import Broken, is_inside
+from mien.errors import Broken
+from mien.formats.head_json import is_inside
 from mien.formats.strict_json import (
     as_list,
     as_number,

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from mien.arrays import Array, UInt8
-from mien.errors import FileFormatError, InputError
+from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_folder, check_folder_place
 from mien.formats.head_json import (
     FORMAT,
-    Broken,
     Json,
     check_version,
     get,

@@ -10,6 +10,7 @@ import numpy as np
 
 from mien.arrays import Array, check_array
 from mien.camera import Camera
+from mien.errors import Broken
 from mien.model.head import SHADING, FittedView, Head
 
 FORMAT = "mien head"
@@ -19,14 +20,6 @@ _EYES = ("left", "right")
 
 Json = dict[str, Any]
 Kind = TypeVar("Kind")
-
-
-class Broken(Exception):
-    """A key that is missing or holds something else; the reader adds the file's name."""
-
-    def __init__(self, place: str, problem: str) -> None:
-        self.place, self.problem = place, problem
-        super().__init__(f"{place}: {problem}")
 
 
 def head_to_json(head: Head, photo_files: Mapping[str, str]) -> Json:

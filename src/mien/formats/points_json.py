@@ -10,9 +10,8 @@ import numpy as np
 
 from mien.arrays import Array, Float, check_array
 from mien.assets.feature_points import FeatureLayout
-from mien.errors import FileFormatError, InputError
+from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_file
-from mien.formats.head_json import Broken
 from mien.formats.strict_json import (
     as_list,
     as_number,

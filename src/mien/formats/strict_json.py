@@ -9,8 +9,7 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
-from mien.errors import FileFormatError, InputError
-from mien.formats.head_json import Broken
+from mien.errors import Broken, FileFormatError, InputError
 
 LARGEST = 1e9
 """No document means larger numbers, and sums and products of these stay exact enough."""

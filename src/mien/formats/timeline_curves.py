@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mien.animate.curves import INTERPOLATIONS, MIN_STEP, Curve, constant
-from mien.formats.head_json import Broken
+from mien.errors import Broken
 from mien.formats.strict_json import as_choice, as_list, as_number, as_object, complain, need
 
 _KEY = ("time", "value", "interpolation", "in", "out")

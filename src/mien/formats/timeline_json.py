@@ -16,9 +16,8 @@ from mien.animate.channels import ANGLES, GAZE, HEAD, MEMBERS, REGIONS, UNITS, s
 from mien.animate.curves import Curve
 from mien.animate.layers import GENERATORS, Generator
 from mien.animate.timeline import PIVOT_MM, Clip, Layer, Placement, Timeline, Tracks
-from mien.errors import FileFormatError, InputError
+from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_file
-from mien.formats.head_json import Broken
 from mien.formats.strict_json import (
     as_choice,
     as_list,

@@ -18,9 +18,8 @@ from typing import Any, TextIO
 import numpy as np
 
 from mien.arrays import Array
-from mien.errors import FileFormatError, InputError
+from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_file
-from mien.formats.head_json import Broken
 from mien.formats.strict_json import check_format, join
 from mien.track.state import TrackedFrame, TrackState
 

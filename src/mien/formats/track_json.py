@@ -7,8 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from mien.errors import FileFormatError, InputError
-from mien.formats.head_json import Broken
+from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.strict_json import (
     as_list,
     as_number,
