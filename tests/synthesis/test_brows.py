@@ -145,3 +145,8 @@ def test_landmarks_and_outside(layout, points):
     assert np.linalg.norm(found - true, axis=1)[rows_of(layout, "left")].max() < 0.015 * WIDTH
     away = detected_points(layout, painted(layout, true), landmarks + 5000)
     np.testing.assert_allclose(away, points + 5000, atol=0.01)
+
+
+def test_points_in_one_place_stay(layout, points):
+    same = np.full_like(points, 7.0)
+    np.testing.assert_array_equal(on_brows(layout, painted(layout, points), same), same)

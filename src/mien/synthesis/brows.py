@@ -89,12 +89,15 @@ def on_brows(
 def _brows(
     layout: FeatureLayout, points: Float[Array, "n 2"]
 ) -> Iterator[tuple[_Brow, Float[Array, " 2"]]]:
-    """Both brows, and which way is up in the face; none where the layout has none."""
+    """Both brows, and which way is up in the face; none where layout or face has no two eyes."""
     corners = [f"{side}_eye_{end}" for side in ("right", "left") for end in ("inner", "outer")]
     if not all(name in layout.names for name in corners):
         return
     right, left = points[[layout.index(name) for name in corners]].reshape(2, 2, 2).mean(axis=1)
-    across = (left - right) / np.linalg.norm(left - right)
+    apart = float(np.linalg.norm(left - right))
+    if apart == 0:
+        return
+    across = (left - right) / apart
     up = np.array([across[1], -across[0]])
     for side in ("right", "left"):
         rows = [

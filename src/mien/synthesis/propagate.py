@@ -13,7 +13,7 @@ from mien.errors import InputError
 from mien.numeric.pca import Pca, fit_pca
 from mien.synthesis.inferred import LEAST_NOISE, Inferred, check_known, check_statistics
 
-__all__ = ["COMPONENTS", "Inferred", "PointSets", "Propagation", "visiting_order"]
+__all__ = ["COMPONENTS", "PointSets", "Propagation", "visiting_order"]
 
 COMPONENTS = (20, 15, 15)
 """Of the sets of each hierarchy. Z06 keeps 5 to 10 of 30 to 40 images; clips have more to tell."""
