@@ -224,3 +224,19 @@ def test_a_users_drawing_is_used(layout: FeatureLayout, points: np.ndarray) -> N
     subregions = default_subregions(layout, points, SIZE, drawing=whole)
     assert subregions.names == ("face",)
     assert len(subregions.members[0]) > 50
+
+
+def test_a_region_that_no_point_tells_of_is_refused(
+    layout: FeatureLayout, points: np.ndarray
+) -> None:
+    """A speck of the frame, off the face."""
+    drawing = load_subregion_drawing(layout)
+    corner = np.eye(1, drawing.corners[0].shape[1], len(layout.names))
+    bare = replace(
+        drawing,
+        names=("speck", *drawing.names[1:]),
+        corners=(np.repeat(corner, 3, axis=0), *drawing.corners[1:]),
+        also=(np.arange(0), *drawing.also[1:]),
+    )
+    with pytest.raises(InputError, match="members of speck: expected indices of points, one at"):
+        default_subregions(layout, points, (400, 400), drawing=bare)
