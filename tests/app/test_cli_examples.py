@@ -190,6 +190,12 @@ def test_sources_and_places_that_cannot_be_used(
     assert contents(photos) == before
     ran = mien("examples", tmp_path / "nowhere", "-o", tmp_path / "set", "--json")
     assert ran.err.endswith("expected a photo, a video or a folder of photos, got nothing there\n")
+    made = tmp_path / "made"
+    assert mien("examples", photos, "-o", made).status == 0
+    before = contents(made)
+    ran = mien("examples", made, "-o", made)
+    assert (ran.status, "expected photos or a video, got an example folder" in ran.err) == (2, True)
+    assert contents(made) == before
     shutil.rmtree(photos)
     wall = written(tmp_path / "wall.mp4", grey([40, 90]))
     ran = mien("examples", wall, "-o", tmp_path / "set", "--json")

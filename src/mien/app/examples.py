@@ -19,12 +19,14 @@ from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.detector import LandmarkDetector
 from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of, rows_of
 from mien.capture.photos import Photo, load_photo
+from mien.errors import InputError
 from mien.formats.atomic import atomic_folder
 from mien.formats.example_folder import (
     check_example_place,
     is_example_folder,
     write_example_files,
 )
+from mien.formats.head_folder import is_head_folder
 from mien.formats.image import encode_image
 from mien.report.example_sheet import example_sheet
 from mien.synthesis.brows import detected_points
@@ -110,9 +112,12 @@ def write_example_folder(
     """Examples of a person, in a folder, whole or not at all.
 
     Raises: InputError, FileFormatError, EstimationError: before anything is written; as
-        `gather_examples`, and a place that holds something else.
+        `gather_examples`, a source that mien made, and a place that holds something else.
     """
     tell = progress or (lambda stage, done, total: None)
+    for kind, found in (("an example", is_example_folder), ("a head", is_head_folder)):
+        if found(Path(source)):
+            raise InputError(source, "photos or a video", f"{kind} folder that mien made of them")
     check_example_place(folder)
     gathered = gather_examples(source, request=request, progress=tell)
     tell(WRITING, 0, 0)
