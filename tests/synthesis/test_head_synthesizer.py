@@ -113,6 +113,17 @@ def test_points_that_do_not_move_leave_the_face_at_rest(propagation):
     np.testing.assert_allclose(completed, points_of(NEUTRAL), atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("name", "by"), [("nose_tip", [0, 8, 0]), ("nose_tip", [6, 0, 0]), ("left_temple", [0, 6, 0])]
+)
+def test_a_point_that_hardly_ever_moves_does_not_throw_the_others(name, by):
+    """Nothing moves much farther than it does."""
+    known = [LAYOUT.index(name)]
+    rest = points_of(NEUTRAL)
+    moved = np.linalg.norm(HEAD.complete(known, rest[known] + by) - rest, axis=1)
+    assert moved.max() < 1.5 * np.linalg.norm(by)
+
+
 def test_a_head_with_neutral_alone_moves_by_its_units():
     alone = head_of(expressions={NEUTRAL: Expression(REST)})
     synthesizer = HeadSynthesizer(alone)

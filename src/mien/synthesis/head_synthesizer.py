@@ -169,7 +169,12 @@ class HeadSynthesizer:
         statistics = np.concatenate([moves, -moves])
         if self._options.propagation == "printed":
             return Propagation(self.layout, statistics)
-        return ConditionalMotion(statistics, components=len(moves), least_noise=_SURE_MM)
+        return ConditionalMotion(
+            statistics,
+            components=len(moves),
+            least_noise=_SURE_MM,
+            places=self.layout.template,
+        )
 
 
 def _without_small(shares: Float[Array, "r k"]) -> Float[Array, "r k"]:
