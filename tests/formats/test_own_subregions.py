@@ -15,7 +15,7 @@ from mien.formats.example_folder import load_examples, write_examples
 from mien.synthesis.examples import Example, ExampleSet
 from mien.synthesis.synthesizer import Synthesizer
 
-PAGE = Path(__file__).parents[2] / "docs" / "synthesis-notes" / "feature-points.md"
+PAGE = Path(__file__).parents[2] / "docs" / "feature-points.md"
 SIZE = (160, 200)
 
 

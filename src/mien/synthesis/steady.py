@@ -34,7 +34,7 @@ def steady_points(
 
     Its landmarks jump by 1 px in a face of 250 px when the picture is turned by a few degrees, and
     by 2 px when it is mirrored: enough to blur what is mixed. Synthesised pictures gain 0.6 to
-    1.5 dB by steady points (docs/synthesis-notes/quality.md). Examples and the geometry that is
+    1.5 dB by steady points (docs/synthesis-quality.md). Examples and the geometry that is
     asked for must be measured alike: steady points in one of both lose 0.4 to 0.8 dB.
 
     Args:
