@@ -18,8 +18,10 @@ from PIL import Image
 from mien.app.cli import main
 from mien.app.demo import demo_photos
 from mien.arrays import Array
+from mien.assets.feature_points import load_feature_layout
 from mien.build import Build, build_head
 from mien.formats.head_folder import save_head
+from mien.formats.points_json import write_points_json
 from mien.model.head import ATLAS, Expression
 from mien.texture.cylinder import cylinder_surface
 from mien.texture.extract import Texture
@@ -134,6 +136,19 @@ def small_james(folder: Path) -> Path:
         marks = demo_photos() / "annotations" / f"photo_{side}.json"
         shutil.copy(marks, folder / "annotations" / f"{side}.json")
     return folder
+
+
+@pytest.fixture
+def asked(tmp_path: Path) -> Callable[..., Path]:
+    """P.json with these points, all of them or those that are named."""
+
+    def write(points: Array, *names: str) -> Path:
+        layout = load_feature_layout()
+        given = {name: points[layout.index(name)] for name in names or layout.names}
+        write_points_json(tmp_path / "P.json", layout, given)
+        return tmp_path / "P.json"
+
+    return write
 
 
 @pytest.fixture

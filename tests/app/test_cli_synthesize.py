@@ -19,7 +19,7 @@ from mien.capture.detector import LandmarkDetector
 from mien.capture.photos import Photo
 from mien.formats.example_folder import write_examples
 from mien.formats.image import load_image
-from mien.formats.points_json import read_points_json, write_points_json
+from mien.formats.points_json import read_points_json
 from mien.formats.pts import points_to_ibug, write_pts
 from mien.formats.tem import points_to_tem, write_tem
 from mien.synthesis.examples import Example, ExampleSet
@@ -63,18 +63,6 @@ def folder(james_set: ExampleSet, tmp_path_factory: pytest.TempPathFactory) -> P
 def neutral(james_set: ExampleSet) -> Array:
     """Where all points are at rest."""
     return james_set.neutral.points.copy()
-
-
-@pytest.fixture
-def asked(tmp_path: Path) -> Asked:
-    """P.json with these points, all of them or those that are named."""
-
-    def write(points: Array, *names: str) -> Path:
-        given = {name: points[LAYOUT.index(name)] for name in names or LAYOUT.names}
-        write_points_json(tmp_path / "P.json", LAYOUT, given)
-        return tmp_path / "P.json"
-
-    return write
 
 
 def test_the_neutral_points_give_the_neutral_photo(

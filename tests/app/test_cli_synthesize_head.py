@@ -30,18 +30,6 @@ def points(expressive: Path) -> dict[str, Array]:
     return {name: feature_points_on(item.vertices) for name, item in shapes.items()}
 
 
-@pytest.fixture
-def asked(tmp_path: Path) -> Asked:
-    """P.json with these points, all of them or those that are named."""
-
-    def write(points: Array, *names: str) -> Path:
-        given = {name: points[LAYOUT.index(name)] for name in names or LAYOUT.names}
-        write_points_json(tmp_path / "P.json", LAYOUT, given)
-        return tmp_path / "P.json"
-
-    return write
-
-
 def test_an_expressions_points_give_its_picture(
     mien: Mien, expressive: Path, points: dict[str, Array], asked: Asked, tmp_path: Path
 ) -> None:

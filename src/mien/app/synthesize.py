@@ -6,12 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mien.app.synthesize_target import HeadChoice, Target, target_from_photo, target_from_points
-from mien.errors import InputError
-from mien.formats.atomic import check_file_place, check_files_apart
+from mien.app.synthesize_target import (
+    HeadChoice,
+    Target,
+    check_request,
+    target_from_photo,
+    target_from_points,
+)
 from mien.formats.example_folder import load_examples
-from mien.formats.image import image_kind, save_image
-from mien.formats.points_file import check_points_place, write_points
+from mien.formats.image import save_image
+from mien.formats.points_file import check_points_kind, write_points
 from mien.formats.weights_json import write_weights
 from mien.synthesis.examples import ExampleSet
 from mien.synthesis.plausible import face_width
@@ -77,14 +81,9 @@ def synthesize_expression(
         `target_from_points`, `target_from_photo`.
     """
     tell = progress or (lambda stage, done, total: None)
-    _check_request(points, photo)
-    image_kind(output)
-    written = [path for path in (output, weights, save_points) if path is not None]
-    check_files_apart(written, [path for path in (points, photo) if path is not None])
-    for path in (output, *([weights] if weights else [])):
-        check_file_place(path)
+    check_request(points, photo, output, weights, save_points)
     if save_points is not None:
-        check_points_place(save_points)
+        check_points_kind(save_points)
     tell(READING, 0, 0)
     synthesizer = Synthesizer(load_examples(folder), options)
     tell(READING, 1, 1)
@@ -119,12 +118,6 @@ def hull_note(examples: ExampleSet, hull_px: dict[str, float]) -> str | None:
         return None
     bound = f"more than {HULL_SHARE:.0%} of the face's width"
     return f"beyond what the examples show, by {bound}: {', '.join(told)}"
-
-
-def _check_request(points: object, photo: object) -> None:
-    if (points is None) == (photo is None):
-        expected = "--points FILE or --photo FILE: where the expression's points are"
-        raise InputError("mien synthesize", expected, "neither" if points is None else "both")
 
 
 def _drawn(synthesizer: Synthesizer, target: Target) -> Synthesized:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mien.app.synthesize_target import check_request
 from mien.arrays import Array, Float, Int
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import InputError
-from mien.formats.atomic import check_file_place, check_files_apart
 from mien.formats.head_folder import load_head
-from mien.formats.image import image_kind, save_image
+from mien.formats.image import save_image
 from mien.formats.points_json import read_points_json
 from mien.formats.weights_json import write_shares
 from mien.model.head import Head
@@ -96,15 +96,7 @@ def synthesize_head(
         EstimationError: no face in the photo that this head fits.
     """
     tell = progress or (lambda stage, done, total: None)
-    if (points is None) == (photo is None):
-        expected = "--points FILE or --photo FILE: where the expression's points are"
-        raise InputError("mien synthesize", expected, "neither" if points is None else "both")
-    image_kind(output)
-    written = [path for path in (output, weights) if path is not None]
-    check_files_apart(written, [path for path in (points, photo) if path is not None])
-    check_file_place(output)
-    if weights is not None:
-        check_file_place(weights)
+    check_request(points, photo, output, weights)
     tell(READING, 0, 0)
     head = load_head(folder)
     tell(READING, 1, 1)

@@ -13,13 +13,15 @@ from mien.app.example_marks import read_marks, with_marks
 from mien.arrays import Array, Float, Int
 from mien.capture.photos import Photo, load_photo
 from mien.errors import EstimationError, InputError
+from mien.formats.atomic import check_file_place, check_files_apart
+from mien.formats.image import image_kind
 from mien.formats.points_file import read_points
 from mien.numeric.planar_motion import PlanarMotion
 from mien.synthesis.plausible import STRANGER, face_width, head_moved, look_mirrored, oddness
 from mien.synthesis.steady import steady_points
 from mien.synthesis.synthesizer import LEAST_TELLING, Synthesizer
 
-__all__ = ["HeadChoice", "Target", "target_from_photo", "target_from_points"]
+__all__ = ["HeadChoice", "Target", "check_request", "target_from_photo", "target_from_points"]
 
 HeadChoice = Literal["auto", "still", "moved"]
 
@@ -45,6 +47,27 @@ class Target:
     motion: PlanarMotion | None = None
     size: tuple[int, int] | None = None
     notes: tuple[str, ...] = ()
+
+
+def check_request(
+    points: str | Path | None, photo: str | Path | None, *written: str | Path | None
+) -> None:
+    """Refuse what cannot be done before the work is.
+
+    Args:
+        points, photo: files, of which one is given.
+        written: files that are to be written; the first is the picture.
+    Raises: InputError: neither or both, another kind of picture, a file over another one, a place
+        that cannot be written.
+    """
+    if (points is None) == (photo is None):
+        expected = "--points FILE or --photo FILE: where the expression's points are"
+        raise InputError("mien synthesize", expected, "neither" if points is None else "both")
+    places = [path for path in written if path is not None]
+    image_kind(places[0])
+    check_files_apart(places, [path for path in (points, photo) if path is not None])
+    for path in places:
+        check_file_place(path)
 
 
 def target_from_points(

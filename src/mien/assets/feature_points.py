@@ -56,6 +56,11 @@ class FeatureLayout:
     def _indices(self) -> dict[str, int]:
         return {name: index for index, name in enumerate(self.names)}
 
+    @cached_property
+    def face_triangles(self) -> Int[Array, "t 3"]:
+        """(T, 3) those of the triangles that need no point of `frame`."""
+        return frozen(self.triangles[(self.triangles < len(self.names)).all(axis=1)])
+
     def index(self, name: str) -> int:
         """The index of a point.
 

@@ -10,12 +10,11 @@ import numpy as np
 from mien.arrays import Array, Float, Int, check_array
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import FileFormatError, InputError
-from mien.formats.atomic import check_file_place
 from mien.formats.points_json import read_points_json, write_points_json
 from mien.formats.pts import IBUG_COUNT, points_from_ibug, points_to_ibug, read_pts, write_pts
 from mien.formats.tem import points_from_tem, points_to_tem, read_tem, write_tem
 
-__all__ = ["check_points_place", "read_points", "write_points"]
+__all__ = ["check_points_kind", "read_points", "write_points"]
 
 Named = dict[str, Float[Array, " 2"]]
 
@@ -32,15 +31,17 @@ def read_points(
         ending says; another layout or template; says where.
     """
     path = Path(path)
-    read = _READERS[_kind(path)]
+    read = _READERS[check_points_kind(path)]
     named = sorted((layout.index(name), place) for name, place in read(path, layout).items())
     return np.array([index for index, _ in named]), np.array([place for _, place in named])
 
 
-def check_points_place(path: str | Path) -> None:
-    """Refuse a place for points before the work is done. Raises: InputError: ending, the place."""
-    _kind(Path(path))
-    check_file_place(path)
+def check_points_kind(path: str | Path) -> str:
+    """The ending of a file of points. Raises: InputError: another one than those there are."""
+    kind = Path(path).suffix.lower()
+    if kind not in _READERS:
+        raise InputError(path, f"a name that ends in {', '.join(_READERS)}", kind or "no suffix")
+    return kind
 
 
 def write_points(path: str | Path, layout: FeatureLayout, points: Float[Array, "n 2"]) -> None:
@@ -51,14 +52,9 @@ def write_points(path: str | Path, layout: FeatureLayout, points: Float[Array, "
     Raises: InputError: another ending, shape, NaN, the place.
     """
     path = Path(path)
-    _WRITERS[_kind(path)](path, layout, check_array("points", points, (len(layout.names), 2)))
-
-
-def _kind(path: Path) -> str:
-    kind = path.suffix.lower()
-    if kind not in _READERS:
-        raise InputError(path, f"a name that ends in {', '.join(_READERS)}", kind or "no suffix")
-    return kind
+    _WRITERS[check_points_kind(path)](
+        path, layout, check_array("points", points, (len(layout.names), 2))
+    )
 
 
 def _to_json(path: Path, layout: FeatureLayout, points: Float[Array, "n 2"]) -> None:

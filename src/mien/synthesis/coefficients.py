@@ -82,7 +82,7 @@ def coefficients(
         distance_penalty=distance_penalty,
         slack=slack,
         together=together,
-        only={"teeth": example_set.teeth},
+        only=example_set.only,
     )
 
 

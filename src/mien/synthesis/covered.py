@@ -46,9 +46,8 @@ class LipColours:
         places = (layout.template - low) * _WIDTH + 1
         width, height = np.ceil(places.max(axis=0)).astype(int) + 1
         self._layout = layout
-        self._triangles = layout.triangles[(layout.triangles < len(layout.names)).all(axis=1)]
         self._raster = rasterize(
-            places, np.ones(len(places)), self._triangles, int(width), int(height)
+            places, np.ones(len(places)), layout.face_triangles, int(width), int(height)
         )
         self._quarters = [
             _filled(places, rows, self._raster.mask) for rows in _outlines(layout.names)
@@ -66,7 +65,7 @@ class LipColours:
             return
         small = shrunk(crop, 2 * _WIDTH)
         scale = np.array(small.shape[1::-1]) / crop.shape[1::-1]
-        face = warped(small, (points - low) * scale, self._triangles, self._raster)
+        face = warped(small, (points - low) * scale, self._layout.face_triangles, self._raster)
         logs = np.log(face.astype(np.float32) + _DARK)
         skin = np.median(logs[self._raster.mask], axis=0)
         contrasts = [logs[quarter].mean(axis=0) - skin for quarter in self._quarters]

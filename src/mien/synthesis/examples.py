@@ -96,6 +96,11 @@ class ExampleSet:
         """The face at rest, in whose pixels geometries are told."""
         return self.examples[0]
 
+    @property
+    def only(self) -> dict[str, tuple[int, ...]]:
+        """The subregions that some of the examples are for, by name, and which (Z06 section 8)."""
+        return {"teeth": self.teeth}
+
     @cached_property
     def geometries(self) -> Float[Array, "m n 2"]:
         """(m, n, 2) of the examples: head motion taken out, px of the neutral photo."""

@@ -47,7 +47,7 @@ def exposure_gains(layout: FeatureLayout, examples: Sequence[Example]) -> Float[
     first = examples[0].points
     low, extent = first.min(axis=0), np.ptp(first, axis=0)
     places = (first - low) * (_SIDE / float(extent.max()))
-    triangles = layout.triangles[(layout.triangles < len(layout.names)).all(axis=1)]
+    triangles = layout.face_triangles
     width, height = np.ceil(places.max(axis=0)).astype(int)
     raster = rasterize(places, np.ones(len(places)), triangles, int(width), int(height))
     faces = [

@@ -12,7 +12,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int, UInt8, check_array, frozen
 from mien.errors import InputError
 from mien.numeric.planar_motion import PlanarMotion, estimate_planar_motion
-from mien.synthesis.coefficients import DISTANCE_PENALTY, apart_from, coefficients, distances_of
+from mien.synthesis.coefficients import DISTANCE_PENALTY, apart_from, coefficients_of, distances_of
 from mien.synthesis.compose import Composer
 from mien.synthesis.conditional import ConditionalMotion
 from mien.synthesis.examples import ExampleSet
@@ -171,16 +171,18 @@ class Synthesizer:
         Raises: InputError: shapes, NaN. EstimationError: all points in one place.
         Source: Z06 sections 6 and 7.
         """
-        examples = self.examples
-        shares = coefficients(
-            examples,
-            points,
+        subregions = self.examples.subregions
+        apart = apart_from(self.examples, points)
+        shares = coefficients_of(
+            apart,
+            subregions,
             distance_penalty=self.options.distance_penalty,
             slack=self.options.slack,
             together=self.options.together,
+            only=self.examples.only,
         )
         image = self._composer.render(points, shares, motion=motion, size=size, out=out)
-        missed = distances_of(apart_from(examples, points), shares, examples.subregions)
+        missed = distances_of(apart, shares, subregions)
         return Synthesis(image, frozen(np.array(points, float)), frozen(shares), frozen(missed))
 
     def _inference(self, known: Int[Array, " k"], told: bool) -> Inference:
