@@ -28,11 +28,13 @@ class Ran:
     def error(self) -> str:
         """The one line of a command that failed as it should, without `error: `."""
         assert self.status == 2
-        assert self.out == ""
         lines = self.err.splitlines()
         assert len(lines) == 1, self.err
         assert lines[0].startswith("error: ")
-        return lines[0].removeprefix("error: ")
+        line = lines[0].removeprefix("error: ")
+        # With --json, the same as an object; else nothing.
+        assert self.out == "" or json.loads(self.out)["error"]["message"] == line
+        return line
 
     @property
     def json(self) -> dict[str, Any]:

@@ -18,8 +18,8 @@ from mien.expressions.contacts import Contacts, fit_units
 from mien.expressions.gaze import with_turned_eyes
 from mien.expressions.looks import Photographed, paint_expressions
 from mien.expressions.regions import default_masks
-from mien.formats.atomic import atomic_folder
-from mien.formats.head_folder import check_head_place, is_head_folder, write_head
+from mien.formats.head_folder import check_head_place, head_place, write_head
+from mien.formats.manifest import kept_notes
 from mien.formats.video import write_video
 from mien.model.expression.fit import ExpressionFit, fit_expression
 from mien.model.expression.known import KnownHead
@@ -72,12 +72,14 @@ class Build:
     Attributes:
         head: the result. capture: the photos with landmarks and marks. fits: by expression.
         coverage: (H, W) summed weights of the photos in the neutral atlas.
+        kept: notes on what the folder held that mien had not written.
     """
 
     head: Head
     capture: Capture
     fits: dict[str, Fit | ExpressionFit]
     coverage: Float[Array, "h w"]
+    kept: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -89,7 +91,7 @@ class Build:
             for note in fit.notes
         ]
         left_out = [f"{photo} was left out: {why}" for photo, why in self.head.left_out.items()]
-        return (*self.capture.notes, *left_out, *fitted)
+        return (*self.capture.notes, *left_out, *fitted, *self.kept)
 
 
 def build_head(
@@ -282,10 +284,10 @@ def build_head_folder(
         be written. Whatever was there stays until the new folder is whole.
     """
     tell = progress or (lambda stage, done, total: None)
-    check_head_place(folder)
+    check_head_place(folder, read=[source])
     result = build_head(source, options=options, progress=progress)
     stage = "Writing the head"
-    with atomic_folder(folder, replaces=is_head_folder) as place:
+    with head_place(folder, read=[source]) as place:
         tell(stage, 0, 2)
         photos = _photos(result.capture)
         used = [(view.photo, photos[view.photo]) for view in result.head.views]
@@ -302,4 +304,4 @@ def build_head_folder(
         )
         page = render_report(report, progress=lambda done, total: tell(REPORTING, done, total))
         (place / "report.html").write_text(page, encoding="utf-8")
-    return result
+    return replace(result, kept=kept_notes(Path(folder)))

@@ -60,3 +60,27 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="name: expected letters"):
         write_frames(tmp_path / "out", pictures(1), name="../x")
     assert not list(tmp_path.iterdir())
+
+
+def test_numbered_pictures_of_others_are_left_alone(tmp_path: Path) -> None:
+    """Of the same kind of name; also one of ours that a painter has saved again."""
+    (tmp_path / "out").mkdir()
+    own = tmp_path / "out" / "holiday_000001.png"
+    Image.fromarray(pictures(1)[0]).save(own)
+    before = own.read_bytes()
+    with pytest.raises(InputError, match="a folder with other things in it"):
+        check_frames_place(tmp_path / "out")
+    assert own.read_bytes() == before
+    write_frames(tmp_path / "drawn", pictures(2))
+    with Image.open(tmp_path / "drawn" / "frame_000001.png") as image:
+        image.load()
+    image.info.clear()
+    image.save(tmp_path / "drawn" / "frame_000001.png")
+    with pytest.raises(InputError, match="a folder with other things in it"):
+        write_frames(tmp_path / "drawn", pictures(2))
+
+
+def test_frames_are_not_made_over_what_they_are_made_from(tmp_path: Path) -> None:
+    write_frames(tmp_path / "out", pictures(1))
+    with pytest.raises(InputError, match="a folder that nothing is read from"):
+        check_frames_place(tmp_path / "out", read=[tmp_path / "out" / "take.json"])

@@ -207,12 +207,21 @@ def test_a_failed_save_leaves_the_old_head(small_head: Head, saved: Path) -> Non
     assert [path.name for path in saved.parent.iterdir()] == ["head"]
 
 
-def test_saving_again_replaces_the_whole_folder(small_head: Head, saved: Path) -> None:
-    (saved / "photos").mkdir()
-    (saved / "photos" / "of_the_last_build.png").write_bytes(b"")
+def test_saving_again_replaces_all_that_mien_wrote(small_head: Head, saved: Path) -> None:
+    save_head(small_head, saved, photos=photos("of_the_last_build.png"))
     save_head(small_head, saved)
     assert not (saved / "photos").exists()
     assert [path.name for path in saved.parent.iterdir()] == ["head"]
+
+
+def test_saving_again_keeps_what_is_not_miens(small_head: Head, saved: Path) -> None:
+    (saved / "notes.txt").write_text("mine")
+    (saved / "takes").mkdir()
+    (saved / "takes" / "take.mp4").write_bytes(b"film")
+    for _ in range(2):
+        save_head(small_head, saved)
+        assert (saved / "notes.txt").read_text() == "mine"
+        assert (saved / "takes" / "take.mp4").read_bytes() == b"film"
 
 
 def test_a_folder_of_something_else_is_never_replaced(small_head: Head, tmp_path: Path) -> None:

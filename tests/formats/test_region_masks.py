@@ -60,6 +60,17 @@ def test_masks_come_back(masked: Head, folder: Path) -> None:
     assert off.max() < 0.2, "between the smallest triangles, in the eye sockets"
 
 
+def test_a_painted_mask_outlives_the_next_build(masked: Head, folder: Path) -> None:
+    mask, other = (folder / "regions" / f"{name}.png" for name in ("left_eye", "left_mouth"))
+    Image.new("L", (32, 32), 255).save(mask)
+    painted, drawn = mask.read_bytes(), other.read_bytes()
+    for _ in range(2):
+        save_head(masked, folder)
+        assert mask.read_bytes() == painted
+        assert other.read_bytes() == drawn
+    np.testing.assert_allclose(load_head(folder).regions["left_eye"], 1, atol=1e-6)
+
+
 def test_a_painted_mask_changes_the_region(masked: Head, folder: Path) -> None:
     """White all over, in another size and kind of picture: that region is the whole head."""
     before = raised(load_head(folder), "left_forehead")

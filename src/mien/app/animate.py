@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,8 +15,9 @@ from mien.app.explained import units_of
 from mien.arrays import Array, UInt8
 from mien.errors import FileFormatError, InputError
 from mien.expressions.state import FaceState
+from mien.formats.atomic import check_file_place, check_files_apart
 from mien.formats.timeline_check import check_timeline
-from mien.formats.timeline_file import load_performance
+from mien.formats.timeline_file import load_performance, performance_files
 from mien.model.head import NEUTRAL, Head
 from mien.render.picture import GREY, HeadRenderer
 
@@ -85,6 +86,7 @@ def animate_head(
     yaw: float = 0.0,
     pitch: float = 0.0,
     background: tuple[int, int, int] | None = None,
+    read: Iterable[str | Path] = (),
     progress: Progress | None = None,
 ) -> Take:
     """Let a head perform a timeline; frames are made one at a time, and a run that is stopped
@@ -98,11 +100,13 @@ def animate_head(
         size: width and height of pictures, px; the timeline's unless given.
         yaw, pitch: radians, how the head is turned before it moves; for pictures.
         background: sRGB. Unless given, pictures and .webm have alpha and an .mp4 a plain grey.
+        read: files and folders beside the timeline that must stay as they are, such as the head's.
         progress: told the stage, the frames done and their total.
-    Raises: InputError: another suffix, a place that cannot be written, a rate that a .fap cannot
-        say. FileFormatError: the timeline; what in it this head cannot do, by its place.
+    Raises: InputError: another suffix, a place that is read or cannot be written, a rate that a
+        .fap cannot say. FileFormatError: the timeline; what in it the head cannot do, by place.
     """
-    write = _writer(path)
+    files = [] if isinstance(timeline, Timeline) else performance_files(timeline)
+    write = _writer(path, [*files, *read])
     name = timeline if isinstance(timeline, (str, Path)) else "timeline"
     played = timeline if isinstance(timeline, Timeline) else load_performance(timeline)
     check_timeline(played, expressions=head.expressions, units=head.unit_names, path=name)
@@ -151,17 +155,20 @@ def _beyond(weights: Mapping[str, float]) -> float:
     return max(max(-weight, weight - 1) for weight in every)
 
 
-def _writer(path: str | Path) -> Callable[[_Job, str | Path], int]:
-    """By suffix. Raises: InputError: no such kind, a folder that holds other things."""
+def _writer(path: str | Path, read: Iterable[str | Path]) -> Callable[[_Job, str | Path], int]:
+    """By suffix. Raises: InputError: no such kind, a place that is read, a folder that holds other
+    things."""
     from mien.formats.frames import check_frames_place
 
     suffix = Path(path).suffix.lower()
     if str(path).endswith("/") or not suffix:
-        check_frames_place(path)
+        check_frames_place(path, read=read)
         return _write_pictures
     if suffix not in _WRITERS:
         kinds = f"a name that ends in {', '.join(_WRITERS)}, or a folder's"
         raise InputError(path, kinds, suffix)
+    check_files_apart([path], read)
+    check_file_place(path)
     return _WRITERS[suffix]
 
 

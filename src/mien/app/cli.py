@@ -19,9 +19,8 @@ from mien.app.options import (
     parse_size,
     parse_state,
 )
-from mien.app.printing import Json, print_result
+from mien.app.printing import Json, print_error, print_result
 from mien.app.progress import terminal_progress
-from mien.errors import MienError
 
 app = typer.Typer(
     help="Photographs of a real person to a textured head.",
@@ -161,14 +160,18 @@ def render(
     json_: Json = False,
 ) -> None:
     """A picture of the head, with alpha."""
+    from mien.formats.atomic import check_file_place, check_files_apart
     from mien.formats.head_folder import load_head
-    from mien.formats.image import save_image
+    from mien.formats.image import image_kind, save_image
     from mien.render.picture import HeadRenderer, render_head
 
     width_height = parse_size("--size", size)
     state = parse_state(expression, region, unit, gaze)
     colour = None if background is None else parse_colour("--background", background)
     angles = [_angle("--yaw", yaw), _angle("--pitch", pitch), _angle("--roll", roll)]
+    image_kind(output)
+    check_files_apart([output], [head])
+    check_file_place(output)
     renderer = HeadRenderer(load_head(head))
     picture = render_head(
         renderer,
@@ -196,10 +199,11 @@ def export(
     json_: Json = False,
 ) -> None:
     """The head as .glb, .obj or .usdz, face units and expressions included."""
-    from mien.formats.export import export_head
+    from mien.formats.export import check_export_place, export_head
     from mien.formats.head_folder import load_head
     from mien.model.head import NEUTRAL
 
+    check_export_place(output, read=[head])
     export_head(load_head(head), output, expression=expression or NEUTRAL)
     print_result(json_, {"output": str(output), "bytes": output.stat().st_size}, str(output))
 
@@ -250,6 +254,7 @@ def animate(
             yaw=_angle("--yaw", yaw),
             pitch=_angle("--pitch", pitch),
             background=colour,
+            read=[head],
             progress=progress,
         )
     data = {"output": output, "frames": take.frames, "notes": take.notes}
@@ -262,7 +267,7 @@ app.command()(synthesize)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line; the console script's entry point. Returns the exit status."""
+    """Run the command line. Returns the exit status."""
     arguments = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in arguments
     arguments = [argument for argument in arguments if argument != "--debug"]
@@ -272,19 +277,8 @@ def main(arguments: list[str] | None = None) -> int:
     except Exception as error:
         if debug:
             raise
-        print("error:", _one_line(error), file=sys.stderr)
+        print_error(error, as_json="--json" in arguments)
         return 2
-
-
-def _one_line(error: Exception) -> str:
-    # Click's own complaints (an unknown option, a missing argument) format themselves.
-    if hasattr(error, "format_message"):
-        text = error.format_message()
-    elif isinstance(error, (MienError, OSError)):
-        text = str(error)
-    else:
-        text = f"internal error: {type(error).__name__}: {error} (--debug shows where)"
-    return " ".join(text.split())
 
 
 def _angle(name: str, degrees: float) -> float:

@@ -84,6 +84,8 @@ def track(
     from mien.formats.head_folder import load_head
 
     files = None if output is None else TrackFiles(output, overlay, plots, live_link, openface)
+    if files is not None:
+        files.check(Path(video), read=[head])
     if is_live:
         from mien.app.live_line import live_line, summary_text
         from mien.app.track_live import track_live_video

@@ -54,7 +54,7 @@ def run_demo(folder: Path, *, progress: Progress) -> Path:
     Raises: InputError: the folder holds something else or cannot be written.
     """
     check_folder_place(folder, replaces=_is_demo)
-    with atomic_folder(folder, replaces=_is_demo) as place:
+    with atomic_folder(folder, replaces=_is_demo, stay=()) as place:
         head = build_head_folder(demo_photos(), place / "head", progress=progress).head
         pictures = _save_pictures(head, place, progress)
         export_head(head, place / "james.glb")

@@ -6,7 +6,7 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,6 +28,7 @@ from mien.formats.example_folder import (
 )
 from mien.formats.head_folder import is_head_folder
 from mien.formats.image import encode_image
+from mien.formats.manifest import kept_notes
 from mien.report.example_sheet import example_sheet
 from mien.synthesis.brows import detected_points
 from mien.synthesis.choose import COUNT
@@ -118,16 +119,16 @@ def write_example_folder(
     for kind, found in (("an example", is_example_folder), ("a head", is_head_folder)):
         if found(Path(source)):
             raise InputError(source, "photos or a video", f"{kind} folder that mien made of them")
-    check_example_place(folder)
+    check_example_place(folder, read=[source])
     gathered = gather_examples(source, request=request, progress=tell)
     tell(WRITING, 0, 0)
-    with atomic_folder(folder, replaces=is_example_folder) as temporary:
+    with atomic_folder(folder, replaces=is_example_folder, read=[source], stay=()) as temporary:
         write_example_files(temporary, gathered.examples, why=gathered.why)
         sheet = example_sheet(gathered.examples, gathered.why)
         (temporary / "examples.jpg").write_bytes(encode_image(sheet, "JPEG", quality=92))
         (temporary / "choice.csv").write_text(_choice_csv(gathered.pictures), encoding="utf-8")
     tell(WRITING, 1, 1)
-    return gathered
+    return replace(gathered, notes=(*gathered.notes, *kept_notes(Path(folder))))
 
 
 def gather_examples(

@@ -8,7 +8,39 @@ from typing import Annotated, Any
 
 import typer
 
+from mien.errors import FileFormatError, InputError, MienError
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, no bars.")]
+
+
+def print_error(error: Exception, *, as_json: bool) -> None:
+    """One line on stderr, and as JSON an object on stdout."""
+    line = _one_line(error)
+    print("error:", line, file=sys.stderr)
+    if as_json:
+        print(json.dumps({"error": {"message": line} | _parts(error)}, indent=2))
+
+
+def _one_line(error: Exception) -> str:
+    # Click's own complaints (an unknown option, a missing argument) format themselves.
+    if hasattr(error, "format_message"):
+        text = error.format_message()
+    elif isinstance(error, (MienError, OSError)):
+        text = str(error)
+    else:
+        # Click turns the end of a file into an abortion of its own.
+        cause = error.__cause__ or error
+        text = f"internal error: {type(cause).__name__}: {cause} (--debug shows where)"
+    return " ".join(text.split())
+
+
+def _parts(error: Exception) -> dict[str, str]:
+    """What a message is made of, for programs."""
+    if isinstance(error, InputError):
+        return {"name": error.name, "expected": error.expected, "found": error.got}
+    if isinstance(error, FileFormatError):
+        return {"file": str(error.path), "place": error.place, "problem": error.problem}
+    return {}
 
 
 def print_result(

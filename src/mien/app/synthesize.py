@@ -81,7 +81,7 @@ def synthesize_expression(
         `target_from_points`, `target_from_photo`.
     """
     tell = progress or (lambda stage, done, total: None)
-    check_request(points, photo, output, weights, save_points)
+    check_request(folder, points, photo, output, weights, save_points)
     if save_points is not None:
         check_points_kind(save_points)
     tell(READING, 0, 0)

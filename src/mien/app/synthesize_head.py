@@ -96,7 +96,7 @@ def synthesize_head(
         EstimationError: no face in the photo that this head fits.
     """
     tell = progress or (lambda stage, done, total: None)
-    check_request(points, photo, output, weights)
+    check_request(folder, points, photo, output, weights)
     tell(READING, 0, 0)
     head = load_head(folder)
     tell(READING, 1, 1)

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from mien.app.example_marks import read_marks, with_marks
+from mien.app.example_marks import mark_files, read_marks, with_marks
 from mien.arrays import Array, Float, Int
 from mien.capture.photos import Photo, load_photo
 from mien.errors import EstimationError, InputError
@@ -50,11 +50,15 @@ class Target:
 
 
 def check_request(
-    points: str | Path | None, photo: str | Path | None, *written: str | Path | None
+    folder: str | Path,
+    points: str | Path | None,
+    photo: str | Path | None,
+    *written: str | Path | None,
 ) -> None:
     """Refuse what cannot be done before the work is.
 
     Args:
+        folder: the examples or the head.
         points, photo: files, of which one is given.
         written: files that are to be written; the first is the picture.
     Raises: InputError: neither or both, another kind of picture, a file over another one, a place
@@ -65,7 +69,8 @@ def check_request(
         raise InputError("mien synthesize", expected, "neither" if points is None else "both")
     places = [path for path in written if path is not None]
     image_kind(places[0])
-    check_files_apart(places, [path for path in (points, photo) if path is not None])
+    read = [Path(path) for path in (points, photo) if path is not None]
+    check_files_apart(places, [folder, *read, *mark_files(read[0])])
     for path in places:
         check_file_place(path)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING
 from mien.animate.tracked import track_moments
 from mien.app.explained import units_of
 from mien.errors import InputError
-from mien.formats.atomic import check_file_place
+from mien.formats.atomic import check_file_place, check_files_apart
 from mien.formats.live_link import write_live_link
 from mien.formats.openface_csv import write_openface
 from mien.formats.track_csv import check_track_place, write_track
+from mien.formats.track_journal import journal_of
+from mien.formats.track_json import sidecar_of
 from mien.formats.video import check_video_place
 from mien.model.head import Head
 from mien.track.state import Track
@@ -42,12 +44,17 @@ class TrackFiles:
     live_link: Path | None = None
     openface: Path | None = None
 
-    def check(self, video: Path) -> None:
+    def check(self, video: Path, *, read: Iterable[str | Path] = ()) -> None:
         """Refuse, before any work is done, places that cannot be written.
 
-        Raises: InputError: names the first of them; two results, or one and the video, in one.
+        Args:
+            read: files and folders beside the video that must stay as they are, as the head's.
+        Raises: InputError: names the first of them; two results, or one and what is read, in one.
         """
         self._check_apart(video)
+        written = [self.table, self.overlay, self.live_link, self.openface]
+        beside = [sidecar_of(self.table), journal_of(self.table)]
+        check_files_apart([*filter(None, written), *beside], [video, *read])
         check_track_place(self.table)
         check_file_place(self.table)
         if self.overlay:

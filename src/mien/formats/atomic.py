@@ -1,20 +1,22 @@
-"""Results appear whole or not at all.
+"""Results appear whole or not at all, and nothing that was there is lost.
 
-Everything is written under a temporary name beside its place and renamed at the end, so that a
-run that fails or is killed leaves what was there before.
+Everything is written under a temporary name beside its place, brought to the disk, and renamed at
+the end, so that a run that fails or is killed leaves what was there before.
 """
 
 from __future__ import annotations
 
 import errno
 import os
-import secrets
 import shutil
-from collections.abc import Callable, Iterable, Iterator
+import stat
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mien.errors import InputError
+from mien.formats.leftovers import put_back, remove_leftovers, temporary_beside
+from mien.formats.manifest import keep_own_files, read_manifest, write_manifest
 
 # Failures of the place that is written to; any other is the caller's own and passes through.
 _PLACE_ERRORS = {
@@ -22,12 +24,17 @@ _PLACE_ERRORS = {
     errno.EDQUOT,
     errno.EEXIST,
     errno.EFBIG,
+    errno.ELOOP,
     errno.ENAMETOOLONG,
     errno.ENOSPC,
     errno.ENOTDIR,
     errno.EPERM,
     errno.EROFS,
 }
+
+
+_NO_SYNC = {errno.EACCES, errno.EPERM, errno.EINVAL, errno.ENOTSUP, errno.EROFS}
+"""Of files and folders that cannot be synced, as opposed to a disk that fails."""
 
 
 class _NothingWritten(Exception):
@@ -43,15 +50,18 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
     Raises: InputError: a folder or a device is in the way, the place cannot be written.
     """
     target = _target(path)
-    if target.exists() and not target.is_file():
-        raise InputError(path, "a file's name", "a folder" if target.is_dir() else "a device")
     with _placing(path, target):
+        if target.exists() and not target.is_file():
+            raise InputError(path, "a file's name", "a folder" if target.is_dir() else "a device")
         target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = _beside(target, "tmp")
+        remove_leftovers(target.parent)
+        temporary = temporary_beside(target, "tmp")
         try:
             temporary.touch(exist_ok=False)
             yield temporary
+            _to_disk(temporary)
             temporary.replace(target)
+            _to_disk(target.parent)
         finally:
             temporary.unlink(missing_ok=True)
 
@@ -68,61 +78,103 @@ def check_file_place(path: str | Path) -> None:
 def check_files_apart(written: Iterable[str | Path], read: Iterable[str | Path] = ()) -> None:
     """Refuse to write over what is read, and two results to one place.
 
+    Args:
+        written: files that a run writes.
+        read: files that it reads; of a folder all that mien wrote there, or all that there is where
+            no list tells (mien.formats.manifest).
     Raises: InputError: names the place.
     """
-    taken = {Path(path).resolve() for path in read}
-    for path in written:
-        if Path(path).resolve() in taken:
-            raise InputError(path, "a place of its own", "a file that is read or written as well")
-        taken.add(Path(path).resolve())
+    taken = [Path(path) for path in read]
+    for path in map(Path, written):
+        for other in taken:
+            if _is_same(path, other):
+                found = "a file that is read or written as well"
+                raise InputError(path, "a place of its own", found)
+            if _belongs(path, other):
+                raise InputError(path, "a place of its own", f"a file of {other}, which is read")
+        taken.append(path)
+
+
+def check_side_file(path: str | Path, main: str | Path) -> None:
+    """Refuse a file that a result brings along and somebody else has put in its place.
+
+    Args:
+        path: whose name nobody gave: it follows from the main file's.
+        main: where that is there, it brought along what lies beside it.
+    Raises: InputError: names both.
+    """
+    if os.path.lexists(path) and not os.path.lexists(main):
+        raise InputError(path, f"a free place for what goes beside {main}", "another file there")
 
 
 @contextmanager
-def atomic_folder(path: str | Path, *, replaces: Callable[[Path], bool]) -> Iterator[Path]:
+def atomic_folder(
+    path: str | Path,
+    *,
+    replaces: Callable[[Path], bool],
+    read: Iterable[str | Path] = (),
+    stay: Collection[str] | None = None,
+) -> Iterator[Path]:
     """A new folder that takes the place of `path` when the block ends without an error.
 
-    The old folder is moved aside, the new one moved in, the old one deleted. A process killed
-    between the two moves leaves the old one beside its place, as `.NAME.*.old`.
+    The old folder is moved aside, the new one moved in, the old one deleted; where a process is
+    killed between the two moves, the next that reads or writes the folder moves the old one back.
 
     Args:
         path: the folder; those above it are made.
         replaces: says of a folder already there whether it may be replaced. An empty one may.
+        read: what the run reads and must not lie in the folder.
+        stay: given, what mien did not write into the old folder is kept in the new one
+            (mien.formats.manifest); at these paths, which people are meant to change, in its place.
     Raises: InputError: as check_folder_place; the place cannot be written.
     """
-    check_folder_place(path, replaces=replaces)
+    check_folder_place(path, replaces=replaces, read=read)
     target = _target(path)
     with _placing(path, target):
         target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = _beside(target, "tmp")
+        remove_leftovers(target.parent)
+        temporary = temporary_beside(target, "tmp")
         try:
             temporary.mkdir()
             yield temporary
+            if stay is not None:
+                write_manifest(temporary)
+                keep_own_files(target, temporary, stay=stay)
+            _tree_to_disk(temporary)
             _swap(temporary, target)
+            _to_disk(target.parent)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
 
 
-def check_folder_place(path: str | Path, *, replaces: Callable[[Path], bool]) -> None:
+def check_folder_place(
+    path: str | Path, *, replaces: Callable[[Path], bool], read: Iterable[str | Path] = ()
+) -> None:
     """Refuse, before any work is done, a place that `atomic_folder` could not take.
 
-    Raises: InputError: a file is in the way, or a folder that holds something else.
+    Raises: InputError: a file is in the way, a folder that holds something else or what is read.
     """
     target = _target(path)
-    if not target.exists():
-        return
-    if not target.is_dir():
-        raise InputError(path, "a folder's name", "a file of that name")
-    if any(target.iterdir()) and not replaces(target):
-        raise InputError(
-            path, "a new folder or one made by mien", "a folder with other things in it"
-        )
+    put_back(target)
+    with _placing(path, target):
+        if not target.exists():
+            return
+        if not target.is_dir():
+            raise InputError(path, "a folder's name", "a file of that name")
+        for source in read:
+            if _target(source).is_relative_to(target):
+                raise InputError(path, "a folder that nothing is read from", f"one with {source}")
+        if any(target.iterdir()) and not replaces(target):
+            raise InputError(
+                path, "a new folder or one made by mien", "a folder with other things in it"
+            )
 
 
 def _swap(new: Path, target: Path) -> None:
     if not target.exists():
         new.rename(target)
         return
-    old = _beside(target, "old")
+    old = temporary_beside(target, "old")
     target.rename(old)
     try:
         new.rename(target)
@@ -137,8 +189,51 @@ def _target(path: str | Path) -> Path:
     return Path(os.path.realpath(path))
 
 
-def _beside(target: Path, suffix: str) -> Path:
-    return target.with_name(f".{target.name}.{secrets.token_hex(4)}.{suffix}")
+def _is_same(one: Path, other: Path) -> bool:
+    """One file, be it by links or by names that the disk takes for one."""
+    try:
+        return os.path.samefile(one, other)
+    except OSError:
+        return _target(one) == _target(other)
+
+
+def _belongs(path: Path, folder: Path) -> bool:
+    """Whether a file is one that a folder, which is read, is made of."""
+    inside, above = _target(path), _target(folder)
+    if not (above.is_dir() and inside.is_relative_to(above)):
+        return False
+    manifest = read_manifest(above)
+    return inside.exists() if manifest is None else _name_in(inside, above) in manifest.files
+
+
+def _name_in(path: Path, folder: Path) -> str:
+    return path.relative_to(folder).as_posix()
+
+
+def _tree_to_disk(folder: Path) -> None:
+    for top, _, names in os.walk(folder):
+        for name in names:
+            _to_disk(Path(top, name))
+        _to_disk(Path(top))
+
+
+def _to_disk(path: Path) -> None:
+    """Have the system write what it still holds, lest a power cut leave an empty file.
+
+    Not every system can do that for folders, nor for somebody else's file that is only linked in.
+    """
+    kind = path.lstat().st_mode
+    if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):
+        return
+    try:
+        handle = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+    except OSError as error:
+        if error.errno not in _NO_SYNC:
+            raise
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -29,6 +29,7 @@ from mien.formats.example_json import (
 )
 from mien.formats.head_json import is_inside
 from mien.formats.image import encode_image, load_image
+from mien.formats.leftovers import put_back
 from mien.formats.npz import read_arrays
 from mien.formats.strict_json import as_list, as_object, as_text, check_format, need, read_json
 from mien.numeric.threads import side_by_side
@@ -60,7 +61,7 @@ def write_examples(
     Raises: InputError: the place holds something else or cannot be written; a name that is no
         file's.
     """
-    with atomic_folder(folder, replaces=is_example_folder) as temporary:
+    with atomic_folder(folder, replaces=is_example_folder, stay=()) as temporary:
         write_example_files(temporary, example_set, why=why)
 
 
@@ -94,9 +95,14 @@ def is_example_folder(folder: Path) -> bool:
         return False
 
 
-def check_example_place(folder: str | Path) -> None:
-    """Refuse a place for examples before the work is done. Raises: InputError."""
-    check_folder_place(folder, replaces=is_example_folder)
+def check_example_place(folder: str | Path, *, read: Iterable[str | Path] = ()) -> None:
+    """Refuse a place for examples before the work is done.
+
+    Args:
+        read: what the examples are made from, which must not lie in the folder.
+    Raises: InputError.
+    """
+    check_folder_place(folder, replaces=is_example_folder, read=read)
 
 
 def load_examples(folder: str | Path, *, layout: FeatureLayout | None = None) -> ExampleSet:
@@ -135,6 +141,7 @@ def read_reasons(folder: str | Path) -> dict[str, str]:
 
 def _read_index(folder: Path) -> tuple[Path, dict[str, Any]]:
     path = folder / INDEX
+    put_back(folder)
     if not folder.is_dir():
         found = "a file" if folder.exists() else "nothing at that place"
         raise InputError(folder, "an example folder that `mien examples` made", found)

@@ -6,8 +6,32 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mien.errors import InputError
+from mien.formats.atomic import check_file_place, check_files_apart, check_side_file
 from mien.formats.head_animation import HeadAnimation
 from mien.model.head import NEUTRAL, Head
+
+_KINDS = (".glb", ".obj", ".usdz")
+
+
+def check_export_place(path: str | Path, *, read: Iterable[str | Path] = ()) -> None:
+    """Refuse, before any work is done, a place that export_head could not or must not take.
+
+    Args:
+        read: files and folders that the head comes from.
+    Raises: InputError: another suffix, a place that is read or cannot be written; for an .obj
+        somebody else's file where its .mtl or .png would go.
+    """
+    path = Path(path)
+    files = [path]
+    if _check_suffix(path) == ".obj":
+        from mien.formats.obj import side_files
+
+        files += side_files(path)
+    check_files_apart(files, read)
+    for file in files[1:]:
+        check_side_file(file, path)
+    for file in files:
+        check_file_place(file)
 
 
 def export_head(
@@ -29,9 +53,7 @@ def export_head(
     Raises: InputError: another suffix, an unknown part or expression, what this kind of file
         cannot hold, a place that cannot be written; for .usdz that usd-core is not installed.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".glb", ".obj", ".usdz"):
-        raise InputError(path, "a name that ends in .glb, .obj or .usdz", suffix or "no suffix")
+    suffix = _check_suffix(path)
     if suffix == ".obj":
         from mien.formats.obj import save_obj
 
@@ -49,3 +71,10 @@ def export_head(
         from mien.formats.usd import save_usdz
 
         save_usdz(head, path, parts=parts, units=units, animation=animation)
+
+
+def _check_suffix(path: str | Path) -> str:
+    suffix = Path(path).suffix.lower()
+    if suffix not in _KINDS:
+        raise InputError(path, "a name that ends in .glb, .obj or .usdz", suffix or "no suffix")
+    return suffix

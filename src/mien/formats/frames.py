@@ -9,19 +9,24 @@ from pathlib import Path
 from mien.arrays import Array, UInt8
 from mien.errors import InputError
 from mien.formats.atomic import atomic_folder, check_folder_place
-from mien.formats.image import encode_image
+from mien.formats.image import encode_image, is_drawn_png
 
 
 def write_frames(
-    path: str | Path, frames: Iterable[UInt8[Array, "h w c"]], *, name: str = "frame"
+    path: str | Path,
+    frames: Iterable[UInt8[Array, "h w c"]],
+    *,
+    name: str = "frame",
+    read: Iterable[str | Path] = (),
 ) -> int:
     """Write frames as NAME_000000.png, NAME_000001.png, ...: all of them or none.
 
     Args:
-        path: a folder: new, empty, or with nothing in it but such pictures, which are replaced.
+        path: a folder: new, empty, or one that this function wrote, whose pictures are replaced.
         frames: (h, w, 4) sRGB with alpha last, not premultiplied, or (h, w, 3); all of one size,
             taken one at a time.
         name: what the pictures' names begin with.
+        read: what the frames are made from, which must not lie in the folder.
     Returns: how many frames were written.
     Raises: InputError: a folder with other things in it, no frame, a frame of another size, a name
         that is none, a place that cannot be written.
@@ -29,7 +34,7 @@ def write_frames(
     if not re.fullmatch(r"[\w-]+", name):
         raise InputError("name", "letters, digits, - and _", repr(name))
     count, shape = 0, None
-    with atomic_folder(path, replaces=_holds_frames) as folder:
+    with atomic_folder(path, replaces=_holds_frames, read=read) as folder:
         for frame in frames:
             shape = shape or frame.shape
             if frame.shape != shape:
@@ -42,15 +47,16 @@ def write_frames(
     return count
 
 
-def check_frames_place(path: str | Path) -> None:
+def check_frames_place(path: str | Path, *, read: Iterable[str | Path] = ()) -> None:
     """Refuse, before any frame is made, a folder that write_frames could not take.
 
-    Raises: InputError: a file is in the way, or a folder that holds other things.
+    Raises: InputError: a file is in the way, a folder that holds other things or what is read.
     """
-    check_folder_place(path, replaces=_holds_frames)
+    check_folder_place(path, replaces=_holds_frames, read=read)
 
 
 def _holds_frames(folder: Path) -> bool:
-    """Whether everything in a folder is a frame of one sequence."""
+    """Whether everything in a folder is a frame of one sequence, and mien drew it."""
     names = [re.fullmatch(r"([\w-]+)_\d{6}\.png", item.name) for item in folder.iterdir()]
-    return all(names) and len({match[1] for match in names if match}) <= 1
+    one_sequence = all(names) and len({match[1] for match in names if match}) <= 1
+    return one_sequence and all(map(is_drawn_png, folder.iterdir()))

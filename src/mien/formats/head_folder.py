@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -27,8 +28,9 @@ from mien.formats.head_json import (
     views_from_json,
 )
 from mien.formats.image import encode_image, load_image
+from mien.formats.leftovers import put_back
 from mien.formats.npz import read_arrays
-from mien.formats.region_masks import read_masks, write_masks
+from mien.formats.region_masks import MASK_FILES, read_masks, write_masks
 from mien.mesh import Mesh
 from mien.model.head import NEUTRAL, Expression, Head
 
@@ -50,8 +52,22 @@ def save_head(
         annotations: contents of `annotations/NAME.json` by NAME, as they were used.
     Raises: InputError: the place holds something else or cannot be written; a photo's name.
     """
-    with atomic_folder(folder, replaces=is_head_folder) as temporary:
+    with head_place(folder) as temporary:
         write_head(head, temporary, photos=photos, annotations=annotations)
+
+
+def head_place(
+    folder: str | Path, *, read: Iterable[str | Path] = ()
+) -> AbstractContextManager[Path]:
+    """An empty folder that becomes the head folder when the block ends without an error.
+
+    What mien did not write into the old one stays, masks that were painted, too.
+
+    Args:
+        read: what the head is made from, which must not lie in the folder.
+    Raises: InputError: as save_head.
+    """
+    return atomic_folder(folder, replaces=is_head_folder, read=read, stay=MASK_FILES)
 
 
 def write_head(
@@ -83,9 +99,9 @@ def is_head_folder(folder: Path) -> bool:
         return False
 
 
-def check_head_place(folder: str | Path) -> None:
-    """Refuse a place for a head before the work is done. Raises: InputError, as save_head."""
-    check_folder_place(folder, replaces=is_head_folder)
+def check_head_place(folder: str | Path, *, read: Iterable[str | Path] = ()) -> None:
+    """Refuse a place for a head before the work is done. Raises: InputError, as head_place."""
+    check_folder_place(folder, replaces=is_head_folder, read=read)
 
 
 def load_head(folder: str | Path) -> Head:
@@ -95,6 +111,7 @@ def load_head(folder: str | Path) -> Head:
         newer than this program; the message names the file and the place in it.
     """
     folder = Path(folder)
+    put_back(folder)
     if not folder.is_dir():
         raise InputError(folder, "a head folder that `mien build` made", _what_is(folder))
     path = folder / "head.json"

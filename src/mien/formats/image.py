@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from mien.formats.atomic import atomic_file
 
 _KINDS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
 _MODES = {3: "RGB", 4: "RGBA"}
+_SOFTWARE = "mien"
+"""Told in every PNG, as the standard provides for."""
 
 
 def image_kind(path: str | Path) -> str:
@@ -57,9 +60,22 @@ def encode_image(pixels: UInt8[Array, "h w c"], kind: str, *, quality: int = 95)
     if kind == "JPEG":
         image.save(stream, "JPEG", quality=quality, subsampling=0, optimize=True)
     else:
+        from PIL.PngImagePlugin import PngInfo
+
+        told = PngInfo()
+        told.add_text("Software", _SOFTWARE)
         # A fifth of the time that the default level takes, for a tenth more bytes of a photograph.
-        image.save(stream, "PNG", compress_level=1)
+        image.save(stream, "PNG", compress_level=1, pnginfo=told)
     return stream.getvalue()
+
+
+def is_drawn_png(path: Path) -> bool:
+    """Whether a file is a PNG that encode_image made, and no program has written since."""
+    with suppress(OSError):
+        if path.is_file():
+            with path.open("rb") as file:
+                return b"tEXtSoftware\0" + _SOFTWARE.encode() in file.read(128)
+    return False
 
 
 def load_image(path: str | Path) -> UInt8[Array, "h w 3"]:

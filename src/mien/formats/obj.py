@@ -38,9 +38,7 @@ def save_obj(
     """
     path = Path(path)
     surface = export_surface(_at_rest_in(head, expression), parts=parts, units=False)
-    # Many readers end a file's name at the first space.
-    stem = re.sub(r"\s+", "_", path.stem)
-    library, picture = f"{stem}.mtl", f"{stem}.png"
+    library, picture = (file.name for file in side_files(path))
     if surface.texture is None:
         picture = ""
     title = f"# {head.generator}: {' '.join(head.subject.split())}\n"
@@ -53,6 +51,12 @@ def save_obj(
     with ExitStack() as stack:
         for file, data in contents.items():
             stack.enter_context(atomic_file(file)).write_bytes(data)
+
+
+def side_files(path: Path) -> tuple[Path, Path]:
+    """The .mtl and the .png beside an .obj; many readers end a file's name at the first space."""
+    stem = re.sub(r"\s+", "_", path.stem)
+    return path.with_name(f"{stem}.mtl"), path.with_name(f"{stem}.png")
 
 
 def _at_rest_in(head: Head, name: str) -> Head:

@@ -14,6 +14,8 @@ from mien.texture.atlas import atlas_surface, fill_gutters
 from mien.texture.surface import over_vertices
 
 FOLDER = "regions"
+MASK_FILES = frozenset(f"{FOLDER}/{name}.png" for name in MASKS)
+"""Within a head folder; people paint them."""
 _SIDE = 1024
 
 

@@ -23,6 +23,14 @@ def load_performance(path: str | Path) -> Timeline:
     return loaders[suffix](path)
 
 
+def performance_files(path: str | Path) -> list[Path]:
+    """The files that load_performance reads: of a track what lies beside it, too."""
+    from mien.formats.track_json import sidecar_of
+
+    path = Path(path)
+    return [path, sidecar_of(path)] if path.suffix.lower() == ".csv" else [path]
+
+
 def _load_table(path: str | Path) -> Timeline:
     from mien.animate.tracked import track_timeline
     from mien.formats.live_link_read import load_live_link
