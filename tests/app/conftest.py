@@ -19,10 +19,14 @@ from mien.app.cli import main
 from mien.app.demo import demo_photos
 from mien.arrays import Array
 from mien.assets.feature_points import load_feature_layout
+from mien.assets.subregions import default_subregions
 from mien.build import Build, build_head
+from mien.capture.detector import LandmarkDetector
+from mien.capture.photos import Photo
 from mien.formats.head_folder import save_head
 from mien.formats.points_json import write_points_json
 from mien.model.head import ATLAS, Expression
+from mien.synthesis.examples import Example, ExampleSet
 from mien.texture.cylinder import cylinder_surface
 from mien.texture.extract import Texture
 from mien.texture.surface import SurfaceMap
@@ -136,6 +140,28 @@ def small_james(folder: Path) -> Path:
         marks = demo_photos() / "annotations" / f"photo_{side}.json"
         shutil.copy(marks, folder / "annotations" / f"{side}.json")
     return folder
+
+
+@pytest.fixture(scope="session")
+def james_set() -> ExampleSet:
+    """James from a photo, as it is and with moved points, told to have moved in 40 ways more."""
+    layout, size = load_feature_layout(), (300, 400)
+    picture = Image.open(demo_photos() / "photo_left.png").convert("RGB")
+    pixels = np.asarray(picture.resize(size, Image.Resampling.LANCZOS))
+    with LandmarkDetector() as detector:
+        found = detector.detect(Photo("james.png", Path("james.png"), pixels))
+    neutral = layout.from_landmarks(found.points)
+    rng = np.random.default_rng(4)
+    x, y = layout.template.T
+    wave, phase = rng.normal(0, 4, (2, 5, 2)), rng.uniform(0, 6, (2, 5))
+    ways = np.sin(wave[..., :1] * x + wave[..., 1:] * y + phase[..., None])  # (2, 5, n)
+    seen = neutral + np.einsum("awn,mw->mna", ways, rng.normal(0, 1.0, (45, 5)))
+    places = [neutral, *seen[:4]]
+    pairs = enumerate(places)
+    examples = tuple(Example(f"e{i}", pixels, points, "james.png") for i, points in pairs)
+    subregions = default_subregions(layout, seen[0], size)
+    found_set = ExampleSet(layout, examples, 1, seen, subregions)
+    return replace(found_set, statistics=found_set.geometry(seen))
 
 
 @pytest.fixture

@@ -14,41 +14,17 @@ from PIL import Image
 from mien.app.demo import demo_photos
 from mien.arrays import Array
 from mien.assets.feature_points import load_feature_layout
-from mien.assets.subregions import default_subregions
-from mien.capture.detector import LandmarkDetector
-from mien.capture.photos import Photo
 from mien.formats.example_folder import write_examples
 from mien.formats.image import load_image
 from mien.formats.points_json import read_points_json
 from mien.formats.pts import points_to_ibug, write_pts
 from mien.formats.tem import points_to_tem, write_tem
-from mien.synthesis.examples import Example, ExampleSet
+from mien.synthesis.examples import ExampleSet
 from terminal import Mien
 
 LAYOUT = load_feature_layout()
 SIZE = (300, 400)
 Asked = Callable[..., Path]
-
-
-@pytest.fixture(scope="session")
-def james_set() -> ExampleSet:
-    """James from a photo, as it is and with moved points, told to have moved in 40 ways more."""
-    picture = Image.open(demo_photos() / "photo_left.png").convert("RGB")
-    pixels = np.asarray(picture.resize(SIZE, Image.Resampling.LANCZOS))
-    with LandmarkDetector() as detector:
-        found = detector.detect(Photo("james.png", Path("james.png"), pixels))
-    neutral = LAYOUT.from_landmarks(found.points)
-    rng = np.random.default_rng(4)
-    x, y = LAYOUT.template.T
-    wave, phase = rng.normal(0, 4, (2, 5, 2)), rng.uniform(0, 6, (2, 5))
-    ways = np.sin(wave[..., :1] * x + wave[..., 1:] * y + phase[..., None])  # (2, 5, n)
-    seen = neutral + np.einsum("awn,mw->mna", ways, rng.normal(0, 1.0, (45, 5)))
-    places = [neutral, *seen[:4]]
-    pairs = enumerate(places)
-    examples = tuple(Example(f"e{i}", pixels, points, "james.png") for i, points in pairs)
-    subregions = default_subregions(LAYOUT, seen[0], SIZE)
-    found_set = ExampleSet(LAYOUT, examples, 1, seen, subregions)
-    return replace(found_set, statistics=found_set.geometry(seen))
 
 
 @pytest.fixture(scope="session")
