@@ -10,7 +10,7 @@ import pytest
 from filmed import written
 from mien.errors import InputError
 from mien.report.track_charts import plots_of
-from mien.report.track_plots import accuracy, summary, write_track_plots
+from mien.report.track_plots import accuracy, check_plots_place, summary, write_track_plots
 from mien.report.track_series import series_of, truth_for
 from mien.track.state import Layout, Track
 from posable import head
@@ -106,3 +106,16 @@ def test_nothing_to_plot(tmp_path: Path, track: Track) -> None:
     with pytest.raises(InputError, match="file"):
         write_track_plots(tmp_path / "file", track)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_another_page_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "index.html").write_text("<title>my site</title>")
+    with pytest.raises(InputError, match=r"index\.html: expected a free place for the page"):
+        check_plots_place(tmp_path)
+    assert (tmp_path / "index.html").read_text() == "<title>my site</title>"
+
+
+def test_plots_may_be_drawn_again(tmp_path: Path, track: Track) -> None:
+    for _ in range(2):
+        check_plots_place(tmp_path / "plots")
+        write_track_plots(tmp_path / "plots", track)

@@ -60,9 +60,9 @@ class TrackFiles:
         if self.overlay:
             check_video_place(self.overlay)
         if self.plots:
-            from mien.report.track_plots import PAGE
+            from mien.report.track_plots import check_plots_place
 
-            check_file_place(self.plots / PAGE)
+            check_plots_place(self.plots)
         for path in filter(None, (self.live_link, self.openface)):
             check_file_place(path)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.errors import InputError
-from mien.formats.atomic import atomic_file
+from mien.formats.atomic import atomic_file, check_file_place
 from mien.formats.image import save_image
 from mien.model.head import Head
 from mien.render.picture import HeadRenderer
@@ -27,6 +27,7 @@ from mien.report.track_sheet import contact_sheet, evenly_chosen
 from mien.track.state import Track
 
 PAGE, SHEET = "index.html", "sheet.jpg"
+_GENERATOR = "mien plots"
 _KINDS = ("png", "svg")
 _SHEET_FRAMES = 16
 
@@ -70,6 +71,17 @@ def write_track_plots(
     return tuple(written)
 
 
+def check_plots_place(folder: str | Path) -> None:
+    """Refuse, before any work is done, a folder whose index.html is another's.
+
+    Raises: InputError: that; a place that cannot be written.
+    """
+    page = Path(folder) / PAGE
+    if page.is_file() and _GENERATOR.encode() not in page.read_bytes():
+        raise InputError(page, "a free place for the page of plots", "another page")
+    check_file_place(page)
+
+
 def _write_each(
     folder: Path,
     track: Track,
@@ -88,6 +100,7 @@ def _write_each(
         yield folder / f"{plot.name}.{kind}"
     known = [] if reference is None else accuracy(series, truth_for(track, reference))
     page = _page(
+        generator=_GENERATOR,
         title=title,
         summary=summary(track, series) + known,
         sheet=SHEET if sheet else "",
