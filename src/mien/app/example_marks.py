@@ -14,7 +14,7 @@ from mien.capture.annotations import AnnotationNames, load_annotations
 from mien.capture.folder import ANNOTATIONS
 from mien.capture.photos import Photo
 from mien.formats.points_file import read_points
-from mien.formats.strict_json import read_json
+from mien.strict_json import read_json
 
 __all__ = ["all_with_marks", "mark_files", "read_marks", "with_marks"]
 

@@ -18,7 +18,8 @@ from mien.animate.layers import GENERATORS, Generator
 from mien.animate.timeline import PIVOT_MM, Clip, Layer, Placement, Timeline, Tracks
 from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_file
-from mien.formats.strict_json import (
+from mien.formats.timeline_curves import curve_from_json, curve_to_json, tidy
+from mien.strict_json import (
     as_choice,
     as_list,
     as_number,
@@ -30,7 +31,6 @@ from mien.formats.strict_json import (
     need,
     read_json,
 )
-from mien.formats.timeline_curves import curve_from_json, curve_to_json, tidy
 
 FORMAT = "mien timeline"
 VERSION = 1

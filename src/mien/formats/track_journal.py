@@ -20,7 +20,7 @@ import numpy as np
 from mien.arrays import Array
 from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_file
-from mien.formats.strict_json import check_format, join
+from mien.strict_json import check_format, join
 from mien.track.state import TrackedFrame, TrackState
 
 FORMAT = "mien track journal"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mien.errors import Broken, FileFormatError, InputError
-from mien.formats.strict_json import (
+from mien.strict_json import (
     as_list,
     as_number,
     as_text,
