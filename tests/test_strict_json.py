@@ -88,7 +88,7 @@ def test_numbers_that_are_not_finite_are_told_where_they_are(text: str) -> None:
 
 def test_limits_of_numbers() -> None:
     assert as_number(1, "a", least=0, most=1) == 1.0
-    with pytest.raises(Broken, match="a: expected a number from -0.5 to 1.5, found 50"):
+    with pytest.raises(Broken, match=r"a: expected a number from -0\.5 to 1\.5, found 50"):
         as_number(50, "a", least=-0.5, most=1.5)
     with pytest.raises(Broken, match="a: expected a number above 0 and at most 10, found 0"):
         as_number(0, "a", above=0, most=10)

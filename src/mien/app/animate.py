@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -54,7 +55,7 @@ class _Job:
     background: tuple[int, int, int] | None
     tell: Callable[[int, int], None] = field(repr=False)
 
-    @property
+    @cached_property
     def times(self) -> Array:
         return frames_of(self.timeline, self.fps)
 
@@ -100,7 +101,8 @@ def animate_head(
         background: sRGB. Unless given, pictures and .webm have alpha and an .mp4 a plain grey.
         progress: told the stage, the frames done and their total.
     Raises: InputError: another suffix, a place that cannot be written, a rate that a .fap cannot
-        say. FileFormatError: the timeline; what in it this head cannot do, by its place.
+        say. FileFormatError: the timeline; what in it this head cannot do, by its place; more than
+        MAX_FRAMES.
     """
     write = _writer(path)
     name = timeline if isinstance(timeline, (str, Path)) else "timeline"
@@ -117,7 +119,12 @@ def animate_head(
         background=background,
         tell=lambda done, total: tell(STAGE, done, total),
     )
-    notes = _hull_notes(job, name)
+    try:
+        _ = job.times
+    except InputError as error:
+        problem = f"expected {error.expected}, found {error.got}"
+        raise FileFormatError(name, problem, error.name) from None
+    notes = (*played.notes, *_hull_notes(job, name))
     return Take(write(job, path), notes)
 
 

@@ -16,6 +16,7 @@ from mien.arrays import Array, UInt8
 from mien.capture.frames_ahead import frames_ahead
 from mien.capture.video import Video, VideoFacts
 from mien.formats.track_journal import Journal, journal_of, load_journal
+from mien.limits import MAX_FPS
 from mien.model.head import Head
 from mien.track.state import Layout, Track, TrackedFrame
 
@@ -113,12 +114,15 @@ class TrackRun:
 
 
 def mean_rate(frames: Sequence[TrackedFrame], stated: float) -> float:
-    """Frames a second by their times; as stated where they do not tell, or agree with it."""
+    """Frames a second by their times; as stated where they do not tell, or agree with it.
+
+    At most MAX_FPS, whatever a broken clock says.
+    """
     elapsed = frames[-1].time - frames[0].time if frames else 0.0
     if elapsed <= 0:
-        return stated
+        return min(stated, MAX_FPS)
     rate = (len(frames) - 1) / elapsed
-    return stated if abs(rate / stated - 1) < _AGREE else rate
+    return min(stated if abs(rate / stated - 1) < _AGREE else rate, MAX_FPS)
 
 
 def digest(head: Head) -> str:
