@@ -191,8 +191,8 @@ BAD += [
         "line 3, Timecode: expected a time after that of the frame",
     ),
     (
-        {3: "13:00:01:58,61" + ",0" * 61},
-        "line 3, Timecode: expected a time at most 3600 s after the",
+        {5: "13:00:02:58,61" + ",0" * 61},
+        "line 5, Timecode: expected a time at most 3600 s after the",
     ),
     ({3: "12:00:00:58,61" + ",0" * 52 + ",30,0,0"}, "line 3, HeadYaw: 30: angles in degrees? exp"),
 ]
