@@ -11,8 +11,9 @@ SOURCE = Path(__file__).parents[1] / "src" / "mien"
 
 # From the first stage to the last. Modules that share an entry may use each other.
 ORDER = (
-    ("errors",),
-    ("arrays",),
+    ("errors", "limits"),
+    ("arrays", "reading"),
+    ("strict_json", "npz"),
     ("mesh", "camera"),
     ("numeric",),
     ("assets",),

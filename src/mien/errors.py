@@ -37,6 +37,10 @@ class FileFormatError(MienError):
         super().__init__(f"{path}: {place + ': ' if place else ''}{problem}")
 
 
+class OtherPointsError(FileFormatError):
+    """A whole file of points, but of a kind that has nothing known in common with mien's."""
+
+
 class EstimationError(MienError):
     """The data cannot answer the question, whoever asks; the message says why."""
 

@@ -219,6 +219,30 @@ def test_past_what_was_photographed_is_noted_once(
         ({"tracks": {"face": {"joy": [[0, 0], [0.4, 1], [0.3, 0]]}}}, "tracks.face.joy.keys[2]"),
         ({"tracks": {"face": {"joy": float("nan")}}}, "tracks.face.joy: "),
         ({"tracks": {"face": {"joy": [[0, 0], [0.4, 2]]}}}, "at 0.30 s: weight of joy: expected"),
+        (
+            {"tracks": {"units": {"jawOpen": [[0, 0], [0.4, 50]]}}},
+            "at 0.10 s: unit jawOpen: expected -0.5 to 1.5, got 7.8125; weights in percent?",
+        ),
+        ({"duration": 86_400, "fps": 1000}, "frames: expected at most 1000000, found 86400 s at 1"),
+        ({"size": [16_384, 16_384]}, "size[0]: expected a number above 0 and at most 8192, found"),
+        (
+            {
+                "duration": 86_400,
+                "fps": 1,
+                "layers": [
+                    {
+                        "generator": "blink",
+                        "period": 0.1,
+                        "jitter": 0,
+                        "closing": 0.01,
+                        "closed": 0.01,
+                        "opening": 0.01,
+                    }
+                ]
+                * 2,
+            },
+            "layers: expected at most 1000000 blinks and breaths, found 1728000 in 86400 s",
+        ),
         ({"duration": -1}, "duration: "),
         ({"play": [{"clip": "nod", "at": 0}]}, "play[0].clip: "),
     ],
@@ -239,7 +263,7 @@ def test_a_bad_timeline_is_named_with_its_place(
         (["-o", "a.mp4", "--fps", 0], "Invalid value for '--fps'"),
         (["-o", "a.mp4", "--fps", 1e9], "Invalid value for '--fps'"),
         (["-o", "a.mp4", "--fps", "nan"], "Invalid value for '--fps'"),
-        (["-o", "a.fap", "--fps", 12.5], "fps: expected a whole number"),
+        (["-o", "a.fap", "--fps", 12.5], "a.fap: expected a whole number of frames a second"),
         (["-o", "a.mp4", "--size", "5"], "--size: expected WIDTHxHEIGHT in px"),
         (["-o", "a.mp4", "--background", "blue"], "--background: expected a colour"),
         (["-o", "a.mp4", "--yaw", "nan"], "--yaw: expected a finite number, got nan"),
@@ -259,6 +283,29 @@ def test_bad_options(
     ran = mien("animate", timeline, "--head", expressive, "--json", *options)
     assert ran.error.startswith(message)
     assert [path.name for path in tmp_path.iterdir()] == ["take.json"]
+
+
+def test_a_rate_that_makes_too_many_frames(expressive: Path, mien: Mien, tmp_path: Path) -> None:
+    path = written(tmp_path, duration=3600)
+    error = mien(
+        "animate", path, "--head", expressive, "-o", tmp_path / "a.fap", "--fps", 1000
+    ).error
+    assert (
+        error == f"{path}: frames: expected at most 1000000, found 3600 s at 1000 frames a second"
+    )
+
+
+def test_what_the_recording_is_like_is_noted(expressive: Path, mien: Mien, tmp_path: Path) -> None:
+    path = written(tmp_path)
+    mien("animate", path, "--head", expressive, "-o", tmp_path / "a.csv")
+    header, *rows = (tmp_path / "a.csv").read_text().splitlines()
+    sparse = [f"00:00:0{i}:00.000{row[15:]}" for i, row in enumerate(rows)]
+    (tmp_path / "b.csv").write_text("\n".join([header, sparse[0], *sparse]) + "\n")
+    ran = mien("animate", tmp_path / "b.csv", "--head", expressive, "-o", tmp_path / "c.csv")
+    assert [line for line in ran.err.splitlines() if line.startswith("note: ")] == [
+        "note: b.csv: a row repeats the timecode of the row before; the first of them counts",
+        "note: b.csv: a row every 1 s; what the face did in between is not in it",
+    ]
 
 
 def test_what_is_no_timeline(expressive: Path, mien: Mien, tmp_path: Path) -> None:

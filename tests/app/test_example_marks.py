@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mien.app.example_marks import read_marks, with_marks
+from mien.app.example_marks import mark_notes, read_marks, with_marks
 from mien.arrays import Array
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.photos import Photo
@@ -105,10 +105,26 @@ def test_broken_marks(
     assert "anna.json" in str(caught.value)
 
 
-def test_a_delineation_of_another_template(layout: FeatureLayout, photo: Photo) -> None:
+def test_points_of_other_kinds_are_noted_and_not_used(layout: FeatureLayout, photo: Photo) -> None:
+    annotate(photo, layout=layout.name, points={"chin": [200, 500]})
+    assert mark_notes(photo.path, layout) == []
     photo.path.with_suffix(".tem").write_text("2\n1 2\n3 4\n0\n")
-    with pytest.raises(FileFormatError, match=r"anna.tem: expected \d+ points .*, found 2"):
-        read_marks(photo.path, photo, layout)
+    write_pts(photo.path.with_suffix(".pts"), np.zeros((5, 2)))
+    assert list(read_marks(photo.path, photo, layout)) == ["chin"]
+    template, ibug = mark_notes(photo.path, layout)
+    assert template.startswith("anna.tem is not used: expected 134 points (zhang134), 7 (dlib's 5")
+    assert template.endswith(", found 2")
+    assert ibug == "anna.pts is not used: expected iBUG's 68 points, found 5"
+
+
+def test_a_damaged_delineation_is_no_other_kind(layout: FeatureLayout, photo: Photo) -> None:
+    photo.path.with_suffix(".tem").write_text("2\n1 2\n3 x\n0\n")
+    for read in (
+        lambda: read_marks(photo.path, photo, layout),
+        lambda: mark_notes(photo.path, layout),
+    ):
+        with pytest.raises(FileFormatError, match=r"anna\.tem: line 3: expected a finite number"):
+            read()
 
 
 def test_neighbours_follow_and_the_far_stay(layout: FeatureLayout, points: Array) -> None:

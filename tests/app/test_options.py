@@ -27,13 +27,21 @@ def test_what_is_no_size(text: str) -> None:
         parse_size("--size", text)
 
 
+@pytest.mark.parametrize("text", ["999999x999999", "8193x1", "9" * 5000 + "x1", "1x" + "9" * 5000])
+def test_what_is_too_large(text: str) -> None:
+    with pytest.raises(InputError, match="--size: expected at most 8192 px a side") as caught:
+        parse_size("--size", text)
+    assert len(str(caught.value)) < 100
+
+
 def test_amounts() -> None:
     texts = ["jawOpen=0.5", "eyeBlinkLeft=-1e-1", "jawOpen=1"]
     assert parse_amounts("--unit", texts) == {"jawOpen": 1.0, "eyeBlinkLeft": -0.1}
     assert parse_amounts("--unit", []) == {}
+    assert parse_amounts("--expression", ["a=b=0.5", "=c==.5"]) == {"a=b": 0.5, "=c=": 0.5}
 
 
-@pytest.mark.parametrize("text", ["", "jawOpen", "=1", "jawOpen=", "jawOpen=1=2", "jawOpen=inf"])
+@pytest.mark.parametrize("text", ["", "jawOpen", "=1", "jawOpen=", "jawOpen=inf", "a=1_0", "a=٣"])
 def test_what_is_no_amount(text: str) -> None:
     with pytest.raises(InputError, match="--unit: expected NAME=AMOUNT"):
         parse_amounts("--unit", [text])
@@ -60,6 +68,7 @@ def test_amounts_by_region() -> None:
     texts = ["mouth:anger=0.4", "left_eye:joy=1", "mouth:joy=-0.1"]
     expected = {"mouth": {"anger": 0.4, "joy": -0.1}, "left_eye": {"joy": 1.0}}
     assert parse_regions("--region", texts) == expected
+    assert parse_regions("--region", ["eyes:a=b=1", "eyes:a:b=2"]) == {"eyes": {"a=b": 1, "a:b": 2}}
 
 
 @pytest.mark.parametrize("text", ["", "mouth=1", ":joy=1", "mouth:=1", "mouth:joy", "mouth:joy=x"])
@@ -92,7 +101,7 @@ def test_counts() -> None:
     assert [parse_count("-n", text) for text in (None, "none", "5")] == [None, 0, 5]
 
 
-@pytest.mark.parametrize("text", ["", "0", "-1", "1.5", "many", "²"])
+@pytest.mark.parametrize("text", ["", "0", "-1", "1.5", "many", "²", "9" * 5000])
 def test_what_is_no_count(text: str) -> None:
     with pytest.raises(InputError, match="--expressions: expected a number from 1 up, or none"):
         parse_count("--expressions", text)

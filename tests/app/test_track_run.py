@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,9 +17,11 @@ from mien.app.track_files import TrackFiles
 from mien.app.track_run import digest, mean_rate
 from mien.arrays import Array
 from mien.camera import Camera
+from mien.errors import FileFormatError
 from mien.expressions.state import FaceState
 from mien.formats.head_folder import load_head
 from mien.formats.track_csv import load_track
+from mien.formats.track_journal import journal_of
 from mien.model.head import Head
 from mien.numeric.rotation import angle_between, rotation_from_vector
 from mien.render.picture import HeadRenderer
@@ -125,6 +128,33 @@ def test_killed_and_resumed_gives_the_same_bytes(
             track_video(clip, filmed.head, tables[1], lens=LENS)
     assert track_video(clip, filmed.head, tables[1], lens=LENS, resume=True).resumed == 3
     assert tables[1].table.read_bytes() == tables[0].table.read_bytes()
+
+
+def test_a_journal_of_more_frames_than_the_clip_has(
+    filmed: Filmed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Stopped(Tracker):
+        def step(self, pixels: Array, frame: int, time: float) -> TrackedFrame:
+            if frame == 4:
+                raise KeyboardInterrupt
+            return super().step(pixels, frame, time)
+
+    clip = written(tmp_path / "a.mp4", filmed.frames[:5], TIMES)
+    files = TrackFiles(tmp_path / "t.csv")
+    with monkeypatch.context() as patch:
+        patch.setattr(mien.app.ready_head, "Tracker", Stopped)
+        with pytest.raises(KeyboardInterrupt):
+            track_video(clip, filmed.head, files, lens=LENS)
+    journal = journal_of(files.table)
+    lines = journal.read_text().splitlines()
+    last = json.loads(lines[-1])
+    more = [json.dumps(last | {"frame": number}) for number in range(4, 9)]
+    journal.write_text("\n".join([*lines, *more, ""]))
+    with pytest.raises(FileFormatError) as caught:
+        track_video(clip, filmed.head, files, lens=LENS, resume=True)
+    problem = "line 10: expected at most the frames of a.mp4, found 9"
+    assert str(caught.value) == f"{journal}: {problem}"
+    assert not files.table.exists()
 
 
 def test_heads_are_told_apart(filmed: Filmed) -> None:

@@ -173,8 +173,8 @@ def _stored() -> dict[str, Any]:
     ("change", "message"),
     [
         (put("format", to="other"), "format: expected 'mien feature points', found 'other'"),
-        (put("version", to=2), "version: expected 1, found 2: written by a newer mien"),
-        (put("points", to=3), "points: expected a list, found 3"),
+        (put("version", to=2), "version: 2 was written by a newer mien"),
+        (put("points", to=3), "points: expected a list, found a number"),
         (put("points", 1, to=[]), r"points\[1\]: expected an object"),
         (put("points", 1, "name", to="right_brow_upper.0"), "'right_brow_upper.0' appears twice"),
         (put("points", 8, "mirror", to="nose"), "mirror: unknown point 'nose'"),
@@ -217,5 +217,5 @@ def test_files_that_are_no_json_are_told(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match="expected JSON in UTF-8"):
         load_feature_layout(tmp_path / "bad.json")
     (tmp_path / "list.json").write_text("[1]")
-    with pytest.raises(FileFormatError, match="expected an object with 'format'"):
+    with pytest.raises(FileFormatError, match="expected an object, found a list"):
         load_feature_layout(tmp_path / "list.json")

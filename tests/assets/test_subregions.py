@@ -179,8 +179,8 @@ def test_bad_calls_are_told(layout: FeatureLayout, points: np.ndarray) -> None:
     ("change", "message"),
     [
         (put("layout", to="ibug68"), "layout: expected 'zhang134', found 'ibug68'"),
-        (put("groups", to=None), "groups: expected an object, found None"),
-        (put("groups", "skin", to=0), "groups.skin: expected a number between 0 and 1, found '0'"),
+        (put("groups", to=None), "groups: expected an object, found null"),
+        (put("groups", "skin", to=0), "groups.skin: expected a number between 0 and 1, found 0"),
         (put("regions", to=[]), "regions: expected at least one"),
         (put("regions", 2, "name", to="left_cheek"), r"regions\[2\]: 'left_cheek' appears twice"),
         (put("regions", 1, "mirror_of", to="nose"), "mirror_of: no subregion 'nose' before"),
@@ -193,7 +193,7 @@ def test_bad_calls_are_told(layout: FeatureLayout, points: np.ndarray) -> None:
         (put("regions", 0, "corners", 1, to={"chin": 0.5}), "shares that sum to 1, found 0.5"),
         (
             put("regions", 0, "corners", 1, to={"chin": 10**400, "menton": 1 - 10**400}),
-            r"right_cheek.corners\[1\]: expected a number, found '1000",
+            r"right_cheek.corners\[1\]: expected a finite number, found inf",
         ),
         (put("regions", 0, "corners", to=[]), "right_cheek.corners: expected at least 3, found 0"),
     ],

@@ -319,7 +319,7 @@ def test_notes_name_what_goes_past_the_photographs() -> None:
         (showing(joy=1.0, awe=0.6), "weight of neutral: expected -0.5 to 1.5, got -0.6"),
         (showing(neutral=0.5, awe=0.4), "weights: expected weights that sum to 1, got .* 0.9"),
         (FaceState({"eyes": {"awe": 2.0}}), "weight of awe: expected -0.5 to 1.5, got 2"),
-        (FaceState(units={"jawOpen": np.inf}), "unit jawOpen: expected a finite number, got inf"),
+        (FaceState(units={"jawOpen": np.inf}), "unit jawOpen: expected -0.5 to 1.5, got inf"),
     ],
 )
 def test_states_that_the_head_cannot_be_in(state: FaceState, message: str) -> None:

@@ -91,15 +91,15 @@ def test_subregions_of_ones_own_are_kept(tmp_path: Path, example_set: ExampleSet
 @pytest.mark.parametrize(
     ("arrays", "message"),
     [
-        ({"names": np.array("upper")}, "names: expected a list, found upper"),
+        ({"names": np.array("upper")}, r"names: expected shape \(any\), found \(\)"),
         ({"names": np.array(["upper", "upper"])}, "subregions: expected names of their own"),
-        ({"members/lower": np.array([1.5])}, "members of lower: expected indices of points"),
+        ({"members/lower": np.array([1.5])}, "members/lower: expected whole numbers from 0 to 133"),
         ({"members/lower": np.arange(0)}, "members of lower: expected indices of points, one"),
-        ({"fades": np.zeros((140, 150, 3))}, r"fades: expected shape \(140, 150, 2\) of standard"),
+        ({"fades": np.zeros((140, 150, 3))}, r"fades: expected shape \(140, 150, 2\), found"),
         ({"fades": np.full((140, 150, 2), np.nan)}, "fades: expected finite numbers"),
         (
             {"fades": np.full((140, 150, 2), 255)},
-            r"fades: expected shares .*, got 255 and a sum of",
+            r"fades: expected numbers from -2 to 2, found 255",
         ),
         ({"fades": np.full((140, 150, 2), -1.0)}, r"fades: expected shares .*, got -1 and a sum"),
     ],
@@ -240,10 +240,10 @@ def test_a_photo_of_another_size(folder: Path) -> None:
         ({"others": np.zeros(3)}, "geometries: missing"),
         (
             {"geometries": np.zeros((4, 68, 2))},
-            r"expected shape \(any, \d+, 2\) of zhang134, found",
+            r"expected shape \(any, 134, 2\), found \(4, 68, 2\)",
         ),
         ({"geometries": np.full((4, 134, 2), np.nan)}, "geometries: expected finite numbers"),
-        ({"geometries": np.zeros((0, 134, 2))}, r"found \(0, 134, 2\)"),
+        ({"geometries": np.zeros((0, 134, 2))}, "geometries: expected at least one"),
     ],
 )
 def test_statistics_of_something_else(folder: Path, arrays: dict[str, Array], message: str) -> None:

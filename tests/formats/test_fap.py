@@ -137,7 +137,7 @@ def test_the_file_says_what_it_holds(tmp_path: Path) -> None:
 
 
 def test_bad_input_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"fps: expected a whole number.*got 29.97"):
+    with pytest.raises(InputError, match=r"a.fap: expected a whole number.*got 29.97"):
         write_fap(tmp_path / "a.fap", [np.zeros(68)], 29.97)
     with pytest.raises(InputError, match="at least one frame to write"):
         write_fap(tmp_path / "a.fap", [], 25)

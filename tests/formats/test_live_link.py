@@ -10,7 +10,7 @@ import pytest
 
 from mien.animate.channels import head_rotation
 from mien.animate.curves import Curve, constant
-from mien.animate.perform import moments
+from mien.animate.perform import frames_of, moments
 from mien.animate.timeline import Timeline
 from mien.assets.generic import load_generic_head
 from mien.errors import FileFormatError, InputError
@@ -180,6 +180,24 @@ BAD = [
 ]
 
 
+BAD += [
+    ({3: "12:00:00:58,61,50"}, "line 3, EyeBlinkLeft: 50: weights in percent? expected a number"),
+    ({3: "12:00:00:58,61,-12.3"}, "line 3, EyeBlinkLeft: -12.3: weights in percent? expected"),
+    ({3: "12:00:00:58,61,1e8"}, "line 3, EyeBlinkLeft: 1e+08: expected a number from -0.5 to 1.5"),
+    ({3: "12:00:00:58,61,1e308"}, "line 3, EyeBlinkLeft: expected a number from -1e+09 to 1e+09"),
+    ({3: "12:00:00:58,61,0,1" + ",0" * 61}, "line 3: expected 63 cells, found 65: decimal commas"),
+    (
+        {3: "11:59:59:58,61" + ",0" * 61},
+        "line 3, Timecode: expected a time after that of the frame",
+    ),
+    (
+        {5: "13:00:02:58,61" + ",0" * 61},
+        "line 5, Timecode: expected a time at most 3600 s after the",
+    ),
+    ({3: "12:00:00:58,61" + ",0" * 52 + ",30,0,0"}, "line 3, HeadYaw: 30: angles in degrees? exp"),
+]
+
+
 @pytest.mark.parametrize(("lines", "message"), BAD)
 def test_bad_files_are_told_in_one_line(tmp_path: Path, lines: dict, message: str) -> None:
     path = recording(tmp_path, lines=lines)
@@ -216,3 +234,58 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="a frame at 0 s or later, got -1 s"):
         write_live_link(tmp_path / "a.csv", [Timeline(1.0).at(-1.0)])
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\n\n"])
+def test_recordings_that_went_through_a_spreadsheet(
+    tmp_path: Path, separator: str, end: str
+) -> None:
+    """Other separators, decimal commas, a mark at the beginning, empty lines and cells."""
+    path = recording(tmp_path)
+    given = load_live_link(path).tracks["units.jawOpen"]
+    rows = [line.replace(",", separator).replace(".", ",") for line in path.read_text().split()]
+    text = end.join(row + 2 * separator for row in ["", *rows, "", ""])
+    path.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    found = load_live_link(path).tracks["units.jawOpen"]
+    np.testing.assert_array_equal(found.times, given.times)
+    np.testing.assert_array_equal(found.values, given.values)
+
+
+def test_quoted_decimal_commas_between_commas(tmp_path: Path) -> None:
+    path = recording(tmp_path)
+    path.write_text(path.read_text().replace(",0.1,", ',"0,1",'))
+    assert load_live_link(path).tracks["units.jawOpen"].values.tolist() == [0, 0.1, 0.2, 0.3]
+
+
+def test_of_rows_with_one_timecode_the_first_counts_and_it_is_noted(tmp_path: Path) -> None:
+    codes = (CODES[0], CODES[1], CODES[1], CODES[2], CODES[2])
+    loaded = load_live_link(recording(tmp_path, codes=codes))
+    assert loaded.tracks["units.jawOpen"].values.tolist() == [0, 0.1, 0.3]
+    assert loaded.notes == (
+        "take.csv: 2 rows repeat the timecode of the row before; the first of them counts",
+    )
+    assert load_live_link(recording(tmp_path)).notes == ()
+
+
+def test_a_row_a_second_is_noted(tmp_path: Path) -> None:
+    codes = tuple(f"12:00:0{second}:00.000" for second in range(5))
+    loaded = load_live_link(recording(tmp_path, codes=codes))
+    assert (loaded.fps, loaded.duration) == (1.0, 5.0)
+    assert loaded.notes == ("take.csv: a row every 1 s; what the face did in between is not in it",)
+
+
+def test_two_rows_far_apart_still_have_a_rate(tmp_path: Path) -> None:
+    loaded = load_live_link(recording(tmp_path, codes=("12:00:00:00.000", "13:00:00:00.000")))
+    assert (loaded.fps, loaded.duration) == (0.01, 3601.0)
+    assert len(frames_of(loaded)) == 36
+
+
+def test_weights_in_percent_are_asked_about(shared: Path) -> None:
+    path = shared / "data" / "cases" / "percent_livelink" / "percent.csv"
+    with pytest.raises(FileFormatError) as caught:
+        load_live_link(path)
+    assert str(caught.value).startswith(f"{path}: line 2, EyeBlinkLeft: 50: weights in percent?")
+    seconds = load_live_link(path.with_name("second_per_row.csv"))
+    assert seconds.fps == 1
+    assert "a row every 1 s" in seconds.notes[0]

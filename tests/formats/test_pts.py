@@ -93,3 +93,23 @@ def test_bad_values_are_told(tmp_path: Path, layout: FeatureLayout) -> None:
         points_to_ibug(layout, np.zeros((68, 2)))
     with pytest.raises(InputError, match="a readable file"):
         read_pts(tmp_path / "none.pts")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "version: 1.0\r\nn_points: 2\r\n{\r\n1 1\r\n10.5 20.25\r\n}\r\n",
+        "# of a database\nversion: 1.0 // the first\nn_points: 2\n{\n1 1 # chin\n\n10.5 20.25\n}",
+        "\ufeffversion: 1.\nn_points:2\n{ 1 1\n10.5 20.25 }",
+    ],
+)
+def test_files_of_other_programs_read(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.pts").write_bytes(text.encode())
+    np.testing.assert_allclose(read_pts(tmp_path / "a.pts"), [[0.5, 0.5], [10, 19.75]])
+
+
+@pytest.mark.parametrize("version", ["2", "1.1", "10", "1.0.0"])
+def test_other_versions_are_told(tmp_path: Path, version: str) -> None:
+    (tmp_path / "a.pts").write_text(HEAD.replace("1", version) + "1 1\n2 2\n}\n")
+    with pytest.raises(FileFormatError, match="expected 'version: 1', 'n_points: 68' and"):
+        read_pts(tmp_path / "a.pts")

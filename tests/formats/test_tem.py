@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from mien.assets.feature_points import load_feature_layout
-from mien.errors import FileFormatError, InputError
+from mien.errors import FileFormatError, InputError, OtherPointsError
+from mien.formats.pts import points_to_ibug
 from mien.formats.tem import (
     Delineation,
     TemLine,
@@ -94,12 +95,12 @@ def test_bad_values_are_not_written(tmp_path: Path) -> None:
 
 
 def test_another_template_is_told() -> None:
-    delineation = Delineation(np.zeros((70, 2)), ())
-    with pytest.raises(FileFormatError) as raised:
+    delineation = Delineation(np.zeros((71, 2)), ())
+    with pytest.raises(OtherPointsError) as raised:
         points_from_tem(delineation, load_feature_layout(), "a.tem")
     assert str(raised.value) == (
-        "a.tem: expected 134 points (zhang134), 83 (Face++), 106 (Face++), "
-        "189 (Face Research Lab), found 70"
+        "a.tem: expected 134 points (zhang134), 7 (dlib's 5 and the middles of the eyes), "
+        "70 (pupils and iBUG's 68), 83 (Face++), 106 (Face++), 189 (Face Research Lab), found 71"
     )
 
 
@@ -130,3 +131,41 @@ def test_real_templates_lie_where_their_names_say(shared: Path, name: str) -> No
     fitted = design @ np.linalg.lstsq(design, marked, rcond=None)[0]
     assert np.abs(fitted - marked).max() < 0.06 * width
     assert named["upper_lip_inner"][1] <= named["lower_lip_inner"][1]
+
+
+def test_pupils_and_ibugs_points(rng: np.random.Generator) -> None:
+    """As webmorphR.dlib writes them: two for the eyes, the image's left one first, then the 68."""
+    layout = load_feature_layout()
+    points = layout.template * 300 + rng.normal(0, 2, layout.template.shape)
+    pupils = [points[layout.index(f"{side}_pupil")] for side in ("right", "left")]
+    found = points_from_tem(
+        Delineation(np.vstack([pupils, points_to_ibug(layout, points)]), ()), layout
+    )
+    assert len(found) == 34
+    for name, place in found.items():
+        np.testing.assert_array_equal(place, points[layout.index(name)])
+
+
+def test_dlibs_five_points() -> None:
+    """dlib counts the eye on the image's right first, from its outer corner in."""
+    layout = load_feature_layout()
+    eyes = [(-20, 0), (20, 1), (30, 1), (10, 1), (-30, 0), (-10, 0), (0, 40)]
+    found = points_from_tem(Delineation(np.array(eyes, float), ()), layout)
+    assert {name: tuple(place) for name, place in found.items()} == {
+        "left_eye_outer": (30, 1),
+        "left_eye_inner": (10, 1),
+        "right_eye_outer": (-30, 0),
+        "right_eye_inner": (-10, 0),
+        "nose_base": (0, 40),
+    }
+
+
+def test_the_70_points_of_the_case_are_a_face(shared: Path) -> None:
+    layout = load_feature_layout()
+    path = shared / "data" / "cases" / "dlib70_tem" / "dlib70.tem"
+    found = points_from_tem(read_tem(path), layout, path)
+    assert found["right_pupil"][0] < found["nose_tip"][0] < found["left_pupil"][0]
+    assert found["nose_tip"][1] < found["upper_lip_outer"][1] < found["menton"][1]
+    for side in ("right", "left"):
+        corners = [found[f"{side}_eye_{end}"] for end in ("inner", "outer")]
+        assert np.linalg.norm(found[f"{side}_pupil"] - np.mean(corners, axis=0)) < 8

@@ -117,6 +117,12 @@ BAD_CELLS = [
     (4, "gaze.yaw", "", "line 4, gaze.yaw: expected a finite number, found ''"),
     (4, "sd.eyes.joy", "x", "line 4, sd.eyes.joy: expected a finite number, found 'x'"),
     (4, "eyes.joy", "9", "line 4, eyes: expected weights that sum to 1, found"),
+    (10, "time", "1e7", "line 10, time: expected at most 86400 s, found 1e+07 s"),
+    (10, "time", "1e300", "line 10, time: expected a number from -1e+09 to 1e+09, found 1e300"),
+    (10, "frame", "9" * 5000, "line 10, frame: expected a whole number, found '999"),
+    (4, "rx", "1e300", "line 4, rx: expected a number from -1e+09 to 1e+09, found 1e300"),
+    (4, "units.jawOpen", "50", "line 4, units.jawOpen: expected a weight from -0.5 to 1.5, found"),
+    (4, "ty", "1_0", "line 4, ty: expected a finite number, found '1_0'"),
     (5, "tx", "3", "line 5, tx: expected an empty cell in a lost frame, found '3'"),
 ]
 
@@ -144,9 +150,12 @@ def test_a_table_that_is_cut_off_is_refused(tmp_path: Path, rng: np.random.Gener
 
 
 BAD_SIDECARS = [
-    ({"version": 2}, "version: 2 was written by a newer mien; this one reads up to 1"),
+    ({"version": 2}, "version: 2 was written by a newer mien (mien "),
     ({"format": "mien head"}, "format: expected 'mien track', found 'mien head'"),
-    ({"fps": 0}, "fps: expected a number above 0"),
+    ({"fps": 0}, "fps: expected a number from 0.01 to 1000, found 0"),
+    ({"fps": 1e9}, "fps: expected a number from 0.01 to 1000, found 1e+09"),
+    ({"focal_px": 10**400}, "focal_px: expected a finite number"),
+    ({"height": 10**30}, "height: expected a number above 0 and at most 65535, found 1e+30"),
     ({"width": 2.5}, "width: expected a whole number"),
     ({"units": ["jawOpen", "jawOpen"]}, "units: 'jawOpen' appears twice"),
     ({"units": None}, "units: expected a list, found null"),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
 
-from mien.arrays import Array, Float, check_array, frozen
+from mien.arrays import Array, Float, Int, check_array, frozen
 from mien.errors import InputError
 
 Interpolation = Literal["cubic", "linear", "hold"]
@@ -15,6 +16,7 @@ MIN_STEP = 1e-6
 """Seconds between two keys, at least: a shorter step would be as steep as no number can say."""
 
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
+_CUBIC, _LINEAR, _ = range(len(INTERPOLATIONS))
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,10 @@ class Curve:
             raise InputError("interpolation", f"{count} of {', '.join(INTERPOLATIONS)}", found)
         values = check_array("values", self.values, (count,))
         given = [_check_slopes(self.slopes_in, count), _check_slopes(self.slopes_out, count)]
-        automatic = _auto_slopes(times, values, np.array(kinds) == "hold")
-        resolved = np.array([np.where(np.isnan(slope), automatic, slope) for slope in given])
+        resolved: Array = np.broadcast_to(0.0, (2, count))
+        if "cubic" in kinds:
+            automatic = _auto_slopes(times, values, np.array(kinds) == "hold")
+            resolved = np.array([np.where(np.isnan(slope), automatic, slope) for slope in given])
         for name, array in (
             ("times", times),
             ("values", values),
@@ -74,12 +78,17 @@ class Curve:
         span = np.where(end > start, self.times[end] - self.times[start], 1.0)
         phase = np.clip((times - self.times[start]) / span, 0.0, 1.0)
         phase = np.where(end > start, phase, 0.0)
-        kind = np.array(self.interpolation)[start]
+        kind = self._kinds[start]
         a, b = self.values[start], self.values[end]
         cubic = _hermite(phase, a, b, self.slopes[1, start] * span, self.slopes[0, end] * span)
         straight = a + phase * (b - a)
-        found: Array = np.select([kind == "cubic", kind == "linear"], [cubic, straight], a)
+        found: Array = np.select([kind == _CUBIC, kind == _LINEAR], [cubic, straight], a)
         return found
+
+    @cached_property
+    def _kinds(self) -> Int[Array, " k"]:
+        """The interpolations by their places in INTERPOLATIONS."""
+        return np.array([INTERPOLATIONS.index(kind) for kind in self.interpolation], np.int8)
 
     def scaled(self, factor: float) -> Curve:
         """The curve with its values and slopes multiplied."""
@@ -141,7 +150,7 @@ def _auto_slopes(times: Array, values: Array, holds: Array) -> Array:
 
 
 def _check_slopes(slopes: Array | None, count: int) -> Array:
-    given = np.full(count, np.nan) if slopes is None else slopes
+    given = np.broadcast_to(np.nan, count) if slopes is None else slopes
     return check_array("slopes", given, (count,), finite=False)
 
 

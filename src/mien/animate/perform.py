@@ -10,6 +10,8 @@ import numpy as np
 from mien.animate.timeline import Moment, Timeline
 from mien.arrays import Array, Float, check_positive
 from mien.camera import Camera
+from mien.errors import InputError
+from mien.limits import MAX_FPS, MAX_FRAMES
 
 
 def frames_of(timeline: Timeline, fps: float | None = None) -> Float[Array, " n"]:
@@ -17,9 +19,16 @@ def frames_of(timeline: Timeline, fps: float | None = None) -> Float[Array, " n"
 
     Args:
         fps: frames a second; the timeline's own unless given.
+    Raises: InputError: a rate out of range, more than MAX_FRAMES.
     """
     rate = check_positive("fps", timeline.fps if fps is None else fps)
-    times: Array = np.arange(max(1, round(timeline.duration * rate))) / rate
+    if rate > MAX_FPS:
+        raise InputError("fps", f"at most {MAX_FPS:g}", f"{rate:g}")
+    count = max(1, round(timeline.duration * rate))
+    if count > MAX_FRAMES:
+        found = f"{timeline.duration:g} s at {rate:g} frames a second"
+        raise InputError("frames", f"at most {MAX_FRAMES}", found)
+    times: Array = np.arange(count) / rate
     return times
 
 

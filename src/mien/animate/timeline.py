@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -13,12 +14,16 @@ from mien.animate.layers import Generator
 from mien.arrays import Array, Float, check_array, check_positive, frozen
 from mien.errors import InputError
 from mien.expressions.state import FaceState
+from mien.limits import MAX_FPS, MAX_FRAMES, MAX_SECONDS, MAX_SIDE
 
 PIVOT_MM = (0.0, -60.0, -80.0)
 """Head space: the top of the neck, where a skull nods and turns."""
 
 MAX_PLAYS, MAX_DEPTH = 10_000, 32
 """Clips inside of clips multiply; a document of a few lines could ask for years of work."""
+
+_BLOCK = 1024
+"""Moments that are sampled at once: a long performance never lies in memory."""
 
 Tracks = Mapping[str, Curve]
 """Curves by channel (`units.jawOpen`, `mouth.joy`, `head.yaw`, `gaze.pitch`); radians and mm."""
@@ -109,8 +114,9 @@ class Timeline:
         tracks: by channel; one that is not there is at 0.
         placements: of clips, added to the tracks. clips: by name.
         layers: added on top.
-    Raises: InputError: a duration, rate or size of 0 or less, an unknown clip, one that contains
-        itself, a channel that is none.
+        notes: what whoever read it adapted, for the user.
+    Raises: InputError: a duration, rate or size of 0 or less, or beyond mien.limits; an unknown
+        clip, one that contains itself, a channel that is none.
     """
 
     duration: float
@@ -121,12 +127,13 @@ class Timeline:
     placements: tuple[Placement, ...] = ()
     clips: Mapping[str, Clip] = field(default_factory=dict)
     layers: tuple[Layer, ...] = ()
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
-        check_positive("duration", self.duration)
-        check_positive("fps", self.fps)
+        _check_at_most("duration", self.duration, MAX_SECONDS)
+        _check_at_most("fps", self.fps, MAX_FPS)
         for length in self.size or ():
-            check_positive("size", length)
+            _check_at_most("size", length, MAX_SIDE)
         object.__setattr__(self, "pivot", frozen(check_array("pivot", self.pivot, (3,))))
         _check_channels(self.tracks)
         _check_placements(self)
@@ -137,13 +144,18 @@ class Timeline:
         total: dict[str, Array] = {}
         _add(total, self.tracks, times, np.ones_like(times))
         self._add_clips(total, self.placements, times, np.ones_like(times))
-        for layer in self.layers:
+        for layer, made in zip(self.layers, self._made, strict=True):
             weight = layer.weight.at(times)
             _add(total, layer.tracks, times, weight)
             self._add_clips(total, layer.placements, times, weight)
-            if layer.generator is not None:
-                _add(total, layer.generator.channels(self.duration), times, weight)
+            _add(total, made, times, weight)
         return total
+
+    @cached_property
+    def _made(self) -> tuple[Tracks, ...]:
+        """What each layer's generator makes."""
+        generators = (layer.generator for layer in self.layers)
+        return tuple({} if item is None else item.channels(self.duration) for item in generators)
 
     def at(self, time: float) -> Moment:
         """Face and head at a time in seconds."""
@@ -151,9 +163,11 @@ class Timeline:
 
     def moments_at(self, times: Float[Array, " n"]) -> Iterator[Moment]:
         """Face and head at these times in seconds, one after the other."""
-        values = self.sample(times)
-        for index, time in enumerate(times):
-            yield self._moment(float(time), {name: row[index] for name, row in values.items()})
+        for start in range(0, len(times), _BLOCK):
+            block = times[start : start + _BLOCK]
+            values = self.sample(block)
+            for index, time in enumerate(block):
+                yield self._moment(float(time), {name: row[index] for name, row in values.items()})
 
     def _moment(self, time: float, values: Mapping[str, float]) -> Moment:
         pose = [float(values.get(f"head.{name}", 0.0)) for name in channels.MEMBERS[channels.HEAD]]
@@ -184,6 +198,11 @@ def _add(total: dict[str, Array], tracks: Tracks, times: Array, weight: Array) -
         total[channel] = total.get(channel, 0.0) + weight * curve.at(times)
 
 
+def _check_at_most(name: str, value: float, most: float) -> None:
+    if check_positive(name, value) > most:
+        raise InputError(name, f"at most {most:g}", f"{value:g}")
+
+
 def _check_channels(tracks: Tracks) -> None:
     for channel in tracks:
         channels.split(channel)
@@ -193,8 +212,15 @@ def _check_placements(timeline: Timeline) -> None:
     counts: dict[str, int] = {}
     for name in timeline.clips:
         _count_plays(timeline.clips, name, (), counts)
-    for placement in (*timeline.placements, *(p for a in timeline.layers for p in a.placements)):
-        _count_plays(timeline.clips, placement.clip, (), counts)
+    placements = (*timeline.placements, *(p for a in timeline.layers for p in a.placements))
+    plays = sum(_count_plays(timeline.clips, item.clip, (), counts) for item in placements)
+    if plays > MAX_PLAYS:
+        raise InputError("play", f"at most {MAX_PLAYS} plays of clips", plays)
+    generators = [layer.generator for layer in timeline.layers if layer.generator is not None]
+    motions = sum(timeline.duration / generator.period for generator in generators)
+    if motions > MAX_FRAMES:
+        expected = f"at most {MAX_FRAMES} blinks and breaths"
+        raise InputError("layers", expected, f"{motions:.0f} in {timeline.duration:g} s")
 
 
 def _count_plays(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,7 +56,7 @@ class _Job:
     background: tuple[int, int, int] | None
     tell: Callable[[int, int], None] = field(repr=False)
 
-    @property
+    @cached_property
     def times(self) -> Array:
         return frames_of(self.timeline, self.fps)
 
@@ -103,7 +104,8 @@ def animate_head(
         read: files and folders beside the timeline that must stay as they are, such as the head's.
         progress: told the stage, the frames done and their total.
     Raises: InputError: another suffix, a place that is read or cannot be written, a rate that a
-        .fap cannot say. FileFormatError: the timeline; what in it the head cannot do, by place.
+        .fap cannot say. FileFormatError: the timeline; what in it the head cannot do, by place;
+        more than MAX_FRAMES.
     """
     files = [] if isinstance(timeline, Timeline) else performance_files(timeline)
     write = _writer(path, [*files, *read])
@@ -121,7 +123,12 @@ def animate_head(
         background=background,
         tell=lambda done, total: tell(STAGE, done, total),
     )
-    notes = _hull_notes(job, name)
+    try:
+        _ = job.times
+    except InputError as error:
+        problem = f"expected {error.expected}, found {error.got}"
+        raise FileFormatError(name, problem, error.name) from None
+    notes = (*played.notes, *_hull_notes(job, name))
     return Take(write(job, path), notes)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,11 @@ from mien.assets.generic import load_generic_head
 from mien.capture.annotations import AnnotationNames, load_annotations
 from mien.capture.folder import ANNOTATIONS
 from mien.capture.photos import Photo
+from mien.errors import OtherPointsError
 from mien.formats.points_file import read_points
-from mien.formats.strict_json import read_json
+from mien.strict_json import read_json
 
-__all__ = ["all_with_marks", "mark_files", "read_marks", "with_marks"]
+__all__ = ["all_with_marks", "mark_files", "mark_notes", "read_marks", "with_marks"]
 
 OF_HEADS = tuple(
     [f"{side}_{part}" for side in ("right", "left") for part in ("eye_outer", "eye_inner")]
@@ -35,21 +37,38 @@ def read_marks(file: Path, photo: Photo, layout: FeatureLayout) -> dict[str, Flo
 
     Looked for in `STEM.tem` and `STEM.pts` beside it and in `annotations/STEM.json`, either
     `{"layout": ..., "points": ...}` or marks as `mien build` uses them; where two of these mark
-    the same point, the later one counts. All are in px of the photo's file, turned upright.
+    the same point, the later one counts. All are in px of the photo's file, turned upright. A file
+    of points that mien does not know is left out; `mark_notes` tells.
 
-    Raises: FileFormatError: one of them is damaged or holds other points; says where.
+    Raises: FileFormatError: one of them is damaged; says where.
     """
     sources = mark_files(file)
     for_heads = [path for path in sources if _is_for_heads(path)]
     found: dict[str, Array] = {}
     for path in (path for path in sources if path not in for_heads):
-        rows, places = read_points(path, layout)
-        found |= {layout.names[r]: at * photo.scale for r, at in zip(rows, places, strict=True)}
+        with suppress(OtherPointsError):
+            rows, places = read_points(path, layout)
+            found |= {layout.names[r]: at * photo.scale for r, at in zip(rows, places, strict=True)}
     for path in for_heads:
         names = AnnotationNames.of(load_generic_head())
         points = load_annotations(path, photo, names=names).points
         found |= {n: points[n] for n in OF_HEADS if n in points and n in layout.names}
     return found
+
+
+def mark_notes(file: Path, layout: FeatureLayout) -> list[str]:
+    """Which files beside a photo hold points that mien does not know.
+
+    Raises: FileFormatError: one of them is damaged.
+    """
+    notes = []
+    for path in mark_files(file):
+        try:
+            if not _is_for_heads(path):
+                read_points(path, layout)
+        except OtherPointsError as error:
+            notes.append(f"{path.name} is not used: {error.problem}")
+    return notes
 
 
 def mark_files(file: Path) -> list[Path]:

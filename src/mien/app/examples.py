@@ -13,7 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mien.app.example_marks import Marks, all_with_marks, mark_files, read_marks, with_marks
+from mien.app.example_marks import (
+    Marks,
+    all_with_marks,
+    mark_files,
+    mark_notes,
+    read_marks,
+    with_marks,
+)
 from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.detector import LandmarkDetector
@@ -169,7 +176,13 @@ def gather_examples(
     video = series.source.name if series.is_video else ""
     examples, why = build_examples(plan, photos, source=video, even=request.even)
     pictures = dict(zip(plan.names, plan.choice.reasons, strict=True)) | series.left_out
-    notes = [*series.notes, *_notes(plan, series, marks), *_set_notes(examples, photos, rows)]
+    unused = [note for file in series.files for note in mark_notes(file, layout)]
+    notes = [
+        *series.notes,
+        *unused,
+        *_notes(plan, series, marks),
+        *_set_notes(examples, photos, rows),
+    ]
     return GatheredExamples(examples, why, tuple(sorted(pictures.items())), tuple(notes))
 
 
@@ -209,7 +222,7 @@ def _marks(series: FaceSeries, layout: FeatureLayout) -> dict[int, Marks]:
     for row, file in enumerate(series.files):
         if mark_files(file):
             found[row] = read_marks(file, load_photo(file, max_side=series.max_side), layout)
-    return found
+    return {row: marks for row, marks in found.items() if marks}
 
 
 def _notes(plan: ExamplePlan, series: FaceSeries, marks: dict[int, Marks]) -> list[str]:

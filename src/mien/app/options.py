@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from math import inf, isfinite, radians
 from typing import TYPE_CHECKING
 
 from mien.errors import InputError
+from mien.limits import LARGEST, MAX_SIDE
 
 if TYPE_CHECKING:
     from mien.expressions.state import FaceState
 
-MAX_SIDE = 8192
-"""Of a rendered picture, px."""
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,3})?", re.ASCII | re.IGNORECASE)
 
 
 def check_finite(name: str, value: float) -> float:
@@ -30,11 +31,17 @@ def check_seconds(name: str, value: float | None) -> None:
 def parse_size(name: str, text: str) -> tuple[int, int]:
     """`800x1000` to (800, 1000). Raises: InputError."""
     width, cross, height = text.lower().partition("x")
-    if not (cross and width.isdecimal() and height.isdecimal() and int(width) and int(height)):
-        raise InputError(name, "WIDTHxHEIGHT in px, as 800x1000", text)
-    if max(int(width), int(height)) > MAX_SIDE:
-        raise InputError(name, f"at most {MAX_SIDE} px a side", text)
-    return int(width), int(height)
+    sides = _whole(width), _whole(height)
+    if not (cross and all(sides)):
+        raise InputError(name, "WIDTHxHEIGHT in px, as 800x1000", text[:40])
+    if max(sides) > MAX_SIDE:
+        raise InputError(name, f"at most {MAX_SIDE} px a side", text[:40])
+    return sides
+
+
+def _whole(text: str) -> int:
+    """The number that digits are; 0 where they are none, some large one for very many of them."""
+    return int(text[:20]) if text.isascii() and text.isdecimal() else 0
 
 
 def parse_amounts(
@@ -43,13 +50,12 @@ def parse_amounts(
     """`["jawOpen=0.5"]` to {"jawOpen": 0.5}. Raises: InputError."""
     amounts = {}
     for text in texts:
-        key, equals, value = text.partition("=")
-        try:
-            if not (key and equals and isfinite(float(value))):
-                raise ValueError
-        except ValueError:
-            raise InputError(name, expected, text) from None
-        amounts[key] = float(value)
+        # A name may have an equals sign in it, an amount has none.
+        key, equals, value = text.rpartition("=")
+        amount = float(value) if _NUMBER.fullmatch(value.strip()) else inf
+        if not (key and equals and isfinite(amount)):
+            raise InputError(name, expected, text[:80])
+        amounts[key] = amount
     return amounts
 
 
@@ -70,7 +76,7 @@ def parse_angles(name: str, text: str) -> tuple[float, float]:
     try:
         yaw, pitch = (float(part) for part in text.split(","))
     except ValueError:
-        raise InputError(name, "YAW,PITCH in degrees, as 10,-5", text) from None
+        raise InputError(name, "YAW,PITCH in degrees, as 10,-5", text[:40]) from None
     return radians(check_finite(name, yaw)), radians(check_finite(name, pitch))
 
 
@@ -100,9 +106,9 @@ def parse_count(name: str, text: str | None) -> int | None:
         return None
     if text.lower() == "none":
         return 0
-    if not (text.isascii() and text.isdecimal() and int(text)):
-        raise InputError(name, "a number from 1 up, or none", text)
-    return int(text)
+    if not 0 < (count := _whole(text)) < LARGEST:
+        raise InputError(name, "a number from 1 up, or none", text[:40])
+    return count
 
 
 def parse_colour(name: str, text: str) -> tuple[int, int, int]:
@@ -111,5 +117,5 @@ def parse_colour(name: str, text: str) -> tuple[int, int, int]:
     try:
         red, green, blue = bytes.fromhex(digits)
     except ValueError:
-        raise InputError(name, "a colour, as #204060", text) from None
+        raise InputError(name, "a colour, as #204060", text[:40]) from None
     return red, green, blue

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from mien.app.example_marks import mark_files, read_marks, with_marks
+from mien.app.example_marks import mark_files, mark_notes, read_marks, with_marks
 from mien.arrays import Array, Float, Int
 from mien.capture.photos import Photo, load_photo
 from mien.errors import EstimationError, InputError
@@ -127,7 +127,7 @@ def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int |
     points = with_marks(layout, detected, read_marks(Path(path), photo, layout))
     motion = synthesizer.head_motion(points)
     notes = [*photo.notes, *landmarks.notes, *_cut_notes(synthesizer, photo, path, points)]
-    notes += _stranger_notes(synthesizer, path, points)
+    notes += [*mark_notes(Path(path), layout), *_stranger_notes(synthesizer, path, points)]
     if motion.scale > _LARGER:
         times = f"{float(motion.scale):.1f} times as large as in the examples"
         notes.append(f"{path}: the face is {times}: the picture is as soft as they are")

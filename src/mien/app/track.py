@@ -110,7 +110,7 @@ def track_video(
             notes.append(note)
         run = TrackRun(clip, facts, ready, focal_px, max_side)
         tracker = run.tracker()
-        journal, kept = run.journal(files.table, resume=resume)
+        journal, kept = run.journal(files.table, tracker.layout, resume=resume)
         with journal:
             start = time.perf_counter()
             frames = run.follow(tracker, journal, kept, tell)

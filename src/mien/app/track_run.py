@@ -15,7 +15,9 @@ from mien.app.ready_head import ReadyHead
 from mien.arrays import Array, UInt8
 from mien.capture.frames_ahead import frames_ahead
 from mien.capture.video import Video, VideoFacts
+from mien.errors import FileFormatError
 from mien.formats.track_journal import Journal, journal_of, load_journal
+from mien.limits import MAX_FPS
 from mien.model.head import Head
 from mien.track.state import Layout, Track, TrackedFrame
 
@@ -55,13 +57,17 @@ class TrackRun:
         """Before the first frame."""
         return self.ready.tracker(self.facts.width, self.facts.height, self.focal_px)
 
-    def journal(self, output: Path, *, resume: bool) -> tuple[Journal, tuple[TrackedFrame, ...]]:
+    def journal(
+        self, output: Path, layout: Layout, *, resume: bool
+    ) -> tuple[Journal, tuple[TrackedFrame, ...]]:
         """The journal of a new run, or of one that goes on with what was kept.
 
+        Args:
+            layout: of the frames.
         Raises: InputError, FileFormatError: another run's, a place that cannot be written.
         """
         path = journal_of(output)
-        kept = load_journal(path, self.header) if resume and path.exists() else ()
+        kept = load_journal(path, self.header, layout) if resume and path.exists() else ()
         return Journal.start(path, self.header, kept), kept
 
     @property
@@ -88,21 +94,30 @@ class TrackRun:
 
         Args:
             tell: told TRACKING, the frames done and their total.
+        Raises: FileFormatError: more frames are kept than the clip has.
         """
         from threadpoolctl import threadpool_limits
 
         frames, stated = list(kept), self.facts.frames
         tracker.resume(frames)
         tell(TRACKING, len(frames), stated)
-        ahead = frames_ahead(self.clip, start=len(frames), max_side=self.max_side)
+        # The last one that is kept is looked for, too: the clip must have it.
+        there = not kept
+        ahead = frames_ahead(self.clip, start=max(0, len(kept) - 1), max_side=self.max_side)
         # BLAS' own threads, waiting for more of its small products, would take the kernels' cores.
         with threadpool_limits(1, user_api="blas"), ahead as pictures:
             for picture in pictures:
+                if picture.frame < len(kept):
+                    there = True
+                    continue
                 # The clock of a joined clip may jump back; a track's does not.
                 seconds = max(picture.seconds, frames[-1].time if frames else 0.0)
                 frames.append(tracker.step(picture.pixels, picture.frame, seconds))
                 journal.append(frames[-1])
                 tell(TRACKING, len(frames), stated and max(stated, len(frames)))
+        if not there:
+            problem = f"expected at most the frames of {self.clip.path.name}, found {len(kept)}"
+            raise FileFormatError(journal.path, problem, f"line {len(kept) + 1}")
         return tuple(frames)
 
     def track(self, layout: Layout, frames: tuple[TrackedFrame, ...]) -> Track:
@@ -113,12 +128,15 @@ class TrackRun:
 
 
 def mean_rate(frames: Sequence[TrackedFrame], stated: float) -> float:
-    """Frames a second by their times; as stated where they do not tell, or agree with it."""
+    """Frames a second by their times; as stated where they do not tell, or agree with it.
+
+    At most MAX_FPS, whatever a broken clock says.
+    """
     elapsed = frames[-1].time - frames[0].time if frames else 0.0
     if elapsed <= 0:
-        return stated
+        return min(stated, MAX_FPS)
     rate = (len(frames) - 1) / elapsed
-    return stated if abs(rate / stated - 1) < _AGREE else rate
+    return min(stated if abs(rate / stated - 1) < _AGREE else rate, MAX_FPS)
 
 
 def digest(head: Head) -> str:

@@ -197,4 +197,5 @@ def _mixes(points: list[Any]) -> Float[Array, "n 478"]:
 
 
 def _landmark(number: str) -> int | None:
-    return int(number) if number.isdecimal() and int(number) < LANDMARK_COUNT else None
+    whole = number.isascii() and number.isdecimal() and len(number) <= len(str(LANDMARK_COUNT))
+    return int(number) if whole and int(number) < LANDMARK_COUNT else None

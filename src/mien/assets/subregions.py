@@ -13,6 +13,7 @@ from mien.arrays import Array, Bool, Float, Int, check_array, frozen
 from mien.assets.data_file import need, read_data, shares
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import Broken, InputError
+from mien.strict_json import as_number
 
 __all__ = ["SubregionDrawing", "Subregions", "default_subregions", "load_subregion_drawing"]
 
@@ -241,9 +242,10 @@ def _points(members: Any, place: str, layout: FeatureLayout) -> list[int]:
 
 
 def _width(value: Any, place: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1:
-        raise Broken(place, f"expected a number between 0 and 1, found {str(value)[:40]!r}")
-    return float(value)
+    number = as_number(value, place)
+    if not 0 < number < 1:
+        raise Broken(place, f"expected a number between 0 and 1, found {number:g}")
+    return number
 
 
 def _polygon(region: Any, name: str, layout: FeatureLayout) -> Float[Array, "c points"]:

@@ -15,6 +15,8 @@ import numpy as np
 from mien.arrays import Array, Float, frozen
 from mien.capture.photos import Photo
 from mien.errors import FileFormatError, InputError
+from mien.limits import LARGEST
+from mien.strict_json import join, kind_of, read_json
 
 if TYPE_CHECKING:
     from mien.assets.generic import GenericHead
@@ -119,40 +121,11 @@ def _rounded(places: Array) -> Any:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(path, "a readable file", error.strerror or error) from None
-    except UnicodeDecodeError:
-        raise FileFormatError(path, "expected JSON in UTF-8, found other bytes") from None
-    try:
-        data = json.loads(text, object_pairs_hook=_without_repetition)
-    except _RepeatedName as repeated:
-        raise FileFormatError(path, "the name appears twice", repeated.args[0]) from None
-    except json.JSONDecodeError as error:
-        place = f"line {error.lineno}, column {error.colno}"
-        raise FileFormatError(path, f"expected JSON: {error.msg}", place) from None
-    except RecursionError:
-        raise FileFormatError(path, "expected points and curves, found deep nesting") from None
-    if not isinstance(data, dict):
-        raise FileFormatError(path, f"expected an object, found {_kind(data)}")
+    data = read_json(path)
     for key in data:
         if key not in _KEYS:
-            raise FileFormatError(path, f"unknown key{_nearest(key, _KEYS)}", key)
+            raise FileFormatError(path, f"unknown key{_nearest(key, _KEYS)}", key[:60])
     return data
-
-
-class _RepeatedName(Exception):
-    """JSON would silently keep the last of two values."""
-
-
-def _without_repetition(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    result: dict[str, Any] = {}
-    for name, value in pairs:
-        if name in result:
-            raise _RepeatedName(name)
-        result[name] = value
-    return result
 
 
 def _stated_size(
@@ -164,7 +137,7 @@ def _stated_size(
     if "size" not in data:
         return original, ()
     size = _numbers(data["size"])
-    if size is None or size.shape != (2,) or not (size > 0).all():
+    if size is None or size.shape != (2,) or not ((size > 0) & (size <= LARGEST)).all():
         raise FileFormatError(path, "expected [width, height] in px", "size")
     if (size == original).all() or (size == photo.size).all():
         return size, ()
@@ -181,16 +154,16 @@ def _section(
 ) -> dict[str, Any]:
     section = data.get(key, {})
     if not isinstance(section, dict):
-        raise FileFormatError(path, f"expected an object, found {_kind(section)}", key)
+        raise FileFormatError(path, f"expected an object, found {kind_of(section)}", key)
     for name in section:
         if name not in known:
-            raise FileFormatError(path, f"unknown name{_nearest(name, known)}", f"{key}.{name}")
+            raise FileFormatError(path, f"unknown name{_nearest(name, known)}", join(key, name))
     return section
 
 
 def _curve(path: Path, place: str, value: Any, size: Array) -> Float[Array, "m 2"]:
     if not isinstance(value, list) or len(value) < 2:
-        found = len(value) if isinstance(value, list) else _kind(value)
+        found = len(value) if isinstance(value, list) else kind_of(value)
         raise FileFormatError(path, f"expected two points or more, found {found}", place)
     points = _points(path, place, value, size)
     if (points == points[0]).all():
@@ -224,16 +197,10 @@ def _numbers(value: Any) -> Array | None:
 
 
 def _nearest(name: str, known: frozenset[str] | tuple[str, ...]) -> str:
-    match = difflib.get_close_matches(name, sorted(known), n=1, cutoff=0.5)
+    match = difflib.get_close_matches(name[:60], sorted(known), n=1, cutoff=0.5)
     return f"; did you mean {match[0]}?" if match else f"; known are {', '.join(sorted(known)[:5])}"
 
 
 def _brief(value: Any) -> str:
     text = json.dumps(value)
     return text if len(text) <= 40 else text[:37] + "..."
-
-
-def _kind(value: Any) -> str:
-    return {dict: "an object", list: "a list", str: "text", type(None): "null"}.get(
-        type(value), "a number"
-    )

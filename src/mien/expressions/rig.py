@@ -18,6 +18,7 @@ from mien.expressions.offsets import add_mixture
 from mien.expressions.regions import AROUND, MASKS, check_masks, default_masks
 from mien.expressions.shading import Openings, brightness_at
 from mien.expressions.state import FACE, FaceState, PosedFace
+from mien.limits import UNIT_RANGE
 from mien.model.head import NEUTRAL, Head
 
 REGIONS = (*MASKS, FACE)
@@ -158,9 +159,10 @@ class Rig:
     def hull_notes(self, state: FaceState) -> tuple[str, ...]:
         """What a state asks for beyond the expressions that were photographed, by its regions.
 
-        Raises: InputError: as evaluate, for expressions and their weights.
+        Raises: InputError: as evaluate.
         """
         self._region_weights(state.expressions)
+        self._unit_weights(state.units)
         weights = {region: self._weights(given) for region, given in state.expressions.items()}
         notes = {region: outside_hull(row, self.names) for region, row in weights.items()}
         return tuple(f"{region}: {note}" for region, note in notes.items() if note)
@@ -191,8 +193,10 @@ class Rig:
         weights = np.zeros(len(self.unit_names))
         for name, weight in given.items():
             _check_known("unit", name, self.unit_names)
-            if not np.isfinite(weight):
-                raise InputError(f"unit {name}", "a finite number", weight)
+            low, high = UNIT_RANGE
+            if not low - 1e-6 <= weight <= high + 1e-6:
+                percent = "; weights in percent?" if high < abs(weight) <= 100 else ""
+                raise InputError(f"unit {name}", f"{low} to {high}", f"{weight:g}{percent}")
             weights[self.unit_names.index(name)] = weight
         return weights
 

@@ -35,7 +35,8 @@ class FaceState:
         expressions: weights of photographed expressions by region: {"face": {"joy": 0.6}} holds
             everywhere, {"mouth": {"anger": 0.4}} instead of it in the mouth, {"left_mouth": ...}
             instead of both in its left half. What is missing to 1 is neutral's.
-        units: weights of face units by name; 0 to 1 is their usual range.
+        units: weights of face units by name; 0 to 1 is their usual range, all that a rig
+            takes is mien.limits.UNIT_RANGE.
         gaze: where the eyes look.
     """
 

@@ -14,7 +14,7 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.assets.subregions import Subregions, default_subregions
-from mien.errors import Broken, FileFormatError, InputError
+from mien.errors import Broken, EstimationError, FileFormatError, InputError
 from mien.formats.atomic import atomic_folder, check_folder_place
 from mien.formats.example_json import (
     FORMAT,
@@ -30,9 +30,9 @@ from mien.formats.example_json import (
 from mien.formats.head_json import is_inside
 from mien.formats.image import encode_image, load_image
 from mien.formats.leftovers import put_back
-from mien.formats.npz import read_arrays
-from mien.formats.strict_json import as_list, as_object, as_text, check_format, need, read_json
+from mien.npz import ArrayFile
 from mien.numeric.threads import side_by_side
+from mien.strict_json import as_list, as_object, as_text, check_format, need, read_json
 from mien.synthesis.align import aligned_photos
 from mien.synthesis.examples import Example, ExampleSet
 
@@ -116,10 +116,13 @@ def load_examples(folder: str | Path, *, layout: FeatureLayout | None = None) ->
     folder, layout = Path(folder), layout or load_feature_layout()
     path, data = _read_index(folder)
     try:
-        return _from_json(folder, data, layout)
+        examples = _from_json(folder, data, layout)
+        # Made now, where the file's name is known; points in one place have none.
+        _ = examples.geometries
+        return examples
     except Broken as broken:
         raise FileFormatError(path, broken.problem, broken.place) from None
-    except InputError as error:
+    except (InputError, EstimationError) as error:
         raise FileFormatError(path, f"{error} (or the other files do not fit it)") from None
 
 
@@ -193,19 +196,16 @@ def _example(folder: Path, entry: object, place: str, layout: FeatureLayout) -> 
     return Example(
         as_text(need(data, "name", place), f"{place}.name"),
         photo,
-        points_from_json(need(data, "points", place), f"{place}.points", layout),
+        points_from_json(need(data, "points", place), f"{place}.points", layout, max(actual)),
         as_text(need(data, "source", place), f"{place}.source"),
     )
 
 
 def _statistics(path: Path, layout: FeatureLayout) -> Float[Array, "N n 2"]:
-    geometries = read_arrays(path)["geometries"]
-    expected = (len(layout.names), 2)
-    if geometries.ndim != 3 or geometries.shape[1:] != expected or not len(geometries):
-        problem = f"expected shape (any, {expected[0]}, 2) of {layout.name}, found"
-        raise FileFormatError(path, f"{problem} {geometries.shape}", "geometries")
-    if geometries.dtype.kind != "f" or not np.isfinite(geometries).all():
-        raise FileFormatError(path, "expected finite numbers, found others", "geometries")
+    with ArrayFile(path) as arrays:
+        geometries = arrays.numbers("geometries", (None, len(layout.names), 2))
+    if not len(geometries):
+        raise FileFormatError(path, "expected at least one picture's points", "geometries")
     return geometries
 
 
@@ -213,17 +213,13 @@ def _subregions(path: Path, layout: FeatureLayout, standard: Example) -> Subregi
     height, width = standard.photo.shape[:2]
     if not path.exists():
         return default_subregions(layout, standard.points, (width, height))
-    arrays = read_arrays(path)
-    if arrays["names"].ndim != 1:
-        raise FileFormatError(path, f"expected a list, found {arrays['names']}", "names")
-    names = tuple(str(name) for name in arrays["names"])
-    members = tuple(arrays[f"members/{name}"] for name in names)
-    fades = arrays["fades"]
-    if fades.shape != (height, width, len(names)):
-        problem = f"expected shape {(height, width, len(names))} of standard.png, found"
-        raise FileFormatError(path, f"{problem} {fades.shape}", "fades")
+    with ArrayFile(path) as arrays:
+        names = arrays.texts("names")
+        count = len(layout.names)
+        members = tuple(arrays.whole(f"members/{n}", (None,), below=count) for n in names)
+        fades = arrays.numbers("fades", (height, width, len(names)), most=2.0)
     try:
-        return Subregions(names, fades, members)
+        return Subregions(names, fades.astype(np.float32), members)
     except InputError as error:
         raise FileFormatError(path, str(error)) from None
 

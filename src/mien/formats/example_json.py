@@ -11,7 +11,7 @@ from mien.arrays import Array, Float
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import Broken
 from mien.formats.head_json import is_inside
-from mien.formats.strict_json import (
+from mien.strict_json import (
     as_list,
     as_number,
     as_object,
@@ -78,8 +78,15 @@ def check_layout(data: dict[str, Any], layout: FeatureLayout) -> None:
     raise Broken("layout", f"expected {expected}, found {found}: run `mien examples` again")
 
 
-def points_from_json(value: object, place: str, layout: FeatureLayout) -> Float[Array, "n 2"]:
-    """(n, 2) px of points by name. Raises: Broken: one is missing, unknown or no place."""
+def points_from_json(
+    value: object, place: str, layout: FeatureLayout, side: int
+) -> Float[Array, "n 2"]:
+    """(n, 2) px of points by name.
+
+    Args:
+        side: px, the photo's longer one; a point of a face that it cuts lies within one more.
+    Raises: Broken: one is missing, unknown or no place.
+    """
     named = as_object(value, place, layout.names)
     points = np.empty((len(layout.names), 2))
     for index, name in enumerate(layout.names):
@@ -87,7 +94,7 @@ def points_from_json(value: object, place: str, layout: FeatureLayout) -> Float[
         pair = as_list(need(named, name, place), where)
         if len(pair) != 2:
             raise Broken(where, f"expected [x, y] in px, found {len(pair)} numbers")
-        points[index] = [as_number(number, where) for number in pair]
+        points[index] = [as_number(number, where, least=-side, most=2 * side) for number in pair]
     return points
 
 

@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from shutil import copyfileobj
+from tempfile import TemporaryFile
 
 import numpy as np
 
@@ -146,19 +148,23 @@ def write_fap(
     Raises: InputError: no frame, a rate that is no whole number, a place that cannot be written.
     """
     if not (fps >= 1 and float(fps).is_integer()):
-        raise InputError("fps", "a whole number, which is all that .fap files can say", f"{fps:g}")
-    rows = [check_array(f"frame {i}", row, (COUNT,), dtype=int) for i, row in enumerate(values)]
-    if not rows:
-        raise InputError(path, "at least one frame to write", "none")
+        expected = "a whole number of frames a second, which is all that it can say"
+        raise InputError(path, expected, f"{fps:g}")
     title = "_".join((name or Path(path).stem).split()) or "mien"
     mask = " ".join("1" if number in MEASURED else "0" for number in range(1, COUNT + 1))
-    chosen = np.array(sorted(MEASURED)) - 1
-    lines = [f"{FILE_VERSION} {title} {int(fps)} {len(rows)}"]
-    for index, row in enumerate(rows):
-        lines += [mask, " ".join(map(str, [index, *row[chosen].tolist()]))]
-    with atomic_file(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return len(rows)
+    chosen, count = np.array(sorted(MEASURED)) - 1, 0
+    # The first line tells how many follow, which is known at the end.
+    with TemporaryFile("w+", encoding="utf-8", newline="\n") as body:
+        for count, values_now in enumerate(values, 1):
+            row = check_array(f"frame {count - 1}", values_now, (COUNT,), dtype=int)
+            body.write(f"{mask}\n{' '.join(map(str, [count - 1, *row[chosen].tolist()]))}\n")
+        if not count:
+            raise InputError(path, "at least one frame to write", "none")
+        body.seek(0)
+        with atomic_file(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+            file.write(f"{FILE_VERSION} {title} {int(fps)} {count}\n")
+            copyfileobj(body, file)
+    return count
 
 
 def _position(vertices: Array, points: tuple[str, ...]) -> Float[Array, " 3"]:

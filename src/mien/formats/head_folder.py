@@ -13,26 +13,27 @@ import numpy as np
 from mien.arrays import Array, UInt8
 from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_folder, check_folder_place
+from mien.formats.head_geometry import check_names, read_geometry
 from mien.formats.head_json import (
     FORMAT,
     Json,
-    check_version,
-    get,
-    get_names,
-    get_path,
-    get_texts,
+    check_header,
     head_to_json,
     is_inside,
     motion_from_json,
     shading_from_json,
+    texts_from_json,
+    texture_files,
     views_from_json,
 )
 from mien.formats.image import encode_image, load_image
 from mien.formats.leftovers import put_back
-from mien.formats.npz import read_arrays
 from mien.formats.region_masks import MASK_FILES, read_masks, write_masks
-from mien.mesh import Mesh
+from mien.limits import MAX_SIDE
 from mien.model.head import NEUTRAL, Expression, Head
+from mien.strict_json import as_names, as_object, as_text, join, need, read_json
+
+HEAD, GEOMETRY = "head.json", "geometry.npz"
 
 Photos = Iterable[tuple[str, UInt8[Array, "h w 3"]]]
 
@@ -87,15 +88,15 @@ def write_head(
         file = folder / "annotations" / f"{name}.json"
         file.parent.mkdir(parents=True, exist_ok=True)
         _write_json(file, annotation)
-    np.savez_compressed(folder / "geometry.npz", **_geometry(head))
-    _write_json(folder / "head.json", head_to_json(head, photo_files))
+    np.savez_compressed(folder / GEOMETRY, **_geometry(head))
+    _write_json(folder / HEAD, head_to_json(head, photo_files))
 
 
 def is_head_folder(folder: Path) -> bool:
     """Whether mien made this folder, of whatever version."""
     try:
-        return bool(_read_json(folder / "head.json").get("format") == FORMAT)
-    except FileFormatError:
+        return bool(read_json(folder / HEAD).get("format") == FORMAT)
+    except (FileFormatError, InputError):
         return False
 
 
@@ -114,53 +115,77 @@ def load_head(folder: str | Path) -> Head:
     put_back(folder)
     if not folder.is_dir():
         raise InputError(folder, "a head folder that `mien build` made", _what_is(folder))
-    path = folder / "head.json"
-    data = _read_json(path)
+    path = folder / HEAD
+    if not path.exists():
+        raise FileFormatError(path, "there is no such file; is this a head folder?")
+    data = read_json(path)
     try:
-        check_version(data)
+        check_header(data)
         return _head_from(folder, data)
     except Broken as broken:
         raise FileFormatError(path, broken.problem, broken.place) from None
-    except (InputError, ValueError) as error:
+    except InputError as error:
         raise FileFormatError(path, f"{error} (or the other files do not fit it)") from None
 
 
 def _head_from(folder: Path, data: Json) -> Head:
-    arrays = read_arrays(folder / "geometry.npz")
-    expressions = get(data, "expressions", dict)
+    expressions = as_object(need(data, "expressions", ""), "expressions")
+    described = {
+        name: (as_object(item, join("expressions", name)), join("expressions", name))
+        for name, item in expressions.items()
+    }
+    if NEUTRAL not in described:
+        raise Broken(f"expressions.{NEUTRAL}", "missing")
+    unit_names = as_names(need(data, "face_units", ""), "face_units")
+    part_names = as_names(need(data, "parts", ""), "parts")
+    geometry = read_geometry(folder / GEOMETRY, tuple(described), part_names, len(unit_names))
+    check_names(geometry.mesh, unit_names)
     shapes = {
         name: Expression(
-            vertices=arrays[f"vertices/{name}"],
-            views=views_from_json(expressions, name),
-            texture=get(expressions[name], "texture", str, f"expressions.{name}"),
-            **motion_from_json(expressions[name], f"expressions.{name}"),
+            vertices=geometry.shapes[name],
+            views=views_from_json(item, place),
+            texture=as_text(need(item, "texture", place), f"{place}.texture"),
+            **motion_from_json(item, place),
         )
-        for name in expressions
+        for name, (item, place) in described.items()
     }
-    if NEUTRAL not in shapes:
-        raise Broken(f"expressions.{NEUTRAL}", "missing")
-    mesh = Mesh(
-        vertices=shapes[NEUTRAL].vertices,
-        triangles=arrays["triangles"],
-        uvs=arrays["uvs"],
-        uv_triangles=arrays["uv_triangles"],
-        part=arrays["part"],
-        part_names=get_names(data, "parts"),
-    )
-    files = get(data, "textures", dict)
+    files = texture_files(data)
+    textures = {name: load_image(folder / file) for name, file in files.items()}
+    _check_textures(folder, files, textures, shapes)
     return Head(
-        subject=get(data, "subject", str),
-        mesh=mesh,
+        subject=as_text(need(data, "subject", ""), "subject"),
+        mesh=geometry.mesh,
         expressions=shapes,
-        uncertainty_mm=arrays["uncertainty_mm"],
-        unit_names=get_names(data, "face_units"),
-        unit_offsets=arrays["unit_offsets"],
-        textures={name: load_image(folder / get_path(files, name, "textures")) for name in files},
-        regions=read_masks(folder, mesh),
+        uncertainty_mm=geometry.uncertainty_mm,
+        unit_names=unit_names,
+        unit_offsets=geometry.unit_offsets,
+        textures=textures,
+        regions=read_masks(folder, geometry.mesh),
         shading=shading_from_json(data),
-        left_out=get_texts(data, "left_out"),
-        generator=get(data, "generator", str),
+        left_out=texts_from_json(data, "left_out"),
+        generator=as_text(need(data, "generator", ""), "generator"),
     )
+
+
+def _check_textures(
+    folder: Path,
+    files: Mapping[str, str],
+    textures: Mapping[str, UInt8[Array, "h w 3"]],
+    shapes: Mapping[str, Expression],
+) -> None:
+    """Those that are mixed must be of one size. Raises: FileFormatError: names the file."""
+    neutral = textures.get(shapes[NEUTRAL].texture)
+    for name, pixels in textures.items():
+        largest = max(pixels.shape[:2])
+        if largest > MAX_SIDE:
+            problem = f"expected at most {MAX_SIDE} px a side, found {largest}"
+            raise FileFormatError(folder / files[name], problem)
+    for shape in shapes.values():
+        own = textures.get(shape.texture)
+        if neutral is not None and own is not None and own.shape != neutral.shape:
+            expected, found = (f"{p.shape[1]}x{p.shape[0]}" for p in (neutral, own))
+            problem = f"expected {expected} px as neutral's texture, found {found}"
+            raise FileFormatError(folder / files[shape.texture], problem)
 
 
 def _geometry(head: Head) -> dict[str, Any]:
@@ -198,20 +223,6 @@ def _write_photo(folder: Path, name: str, pixels: UInt8[Array, "h w 3"]) -> str:
 def _write_json(path: Path, data: Json) -> None:
     text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8")
-
-
-def _read_json(path: Path) -> Json:
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise FileFormatError(path, "there is no such file; is this a head folder?") from None
-    except json.JSONDecodeError as error:
-        raise FileFormatError(path, error.msg, f"line {error.lineno}") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileFormatError(path, f"not a readable text file ({error})") from None
-    if not isinstance(data, dict):
-        raise FileFormatError(path, "expected one JSON object")
-    return data
 
 
 def _what_is(folder: Path) -> str:

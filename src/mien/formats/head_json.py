@@ -4,22 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import PurePosixPath
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from mien.arrays import Array, check_array
+from mien.arrays import Array
 from mien.camera import Camera
-from mien.errors import Broken
+from mien.errors import Broken, InputError
+from mien.limits import MAX_PHOTO_SIDE, UNIT_RANGE
 from mien.model.head import SHADING, FittedView, Head
+from mien.strict_json import (
+    as_array,
+    as_choice,
+    as_list,
+    as_number,
+    as_object,
+    as_text,
+    as_whole,
+    check_format,
+    join,
+    need,
+)
 
 FORMAT = "mien head"
 VERSION = 1
 
-_EYES = ("left", "right")
+UNITS = {
+    "length": "mm",
+    "axes": "x to the subject's left, y up, z out of the face",
+    "pixels": "origin at the top-left corner, centre of the first pixel at (0.5, 0.5)",
+}
+"""What the numbers of a head folder mean."""
+
+_EYES, _AXES = ("left", "right"), ("yaw", "pitch")
 
 Json = dict[str, Any]
-Kind = TypeVar("Kind")
 
 
 def head_to_json(head: Head, photo_files: Mapping[str, str]) -> Json:
@@ -33,11 +52,7 @@ def head_to_json(head: Head, photo_files: Mapping[str, str]) -> Json:
         "version": VERSION,
         "generator": head.generator,
         "subject": head.subject,
-        "units": {
-            "length": "mm",
-            "axes": "x to the subject's left, y up, z out of the face",
-            "pixels": "origin at the top-left corner, centre of the first pixel at (0.5, 0.5)",
-        },
+        "units": dict(UNITS),
         "parts": list(head.mesh.part_names),
         "expressions": {
             name: {
@@ -59,80 +74,68 @@ def head_to_json(head: Head, photo_files: Mapping[str, str]) -> Json:
     }
 
 
-def check_version(data: Json) -> None:
-    """Raises: Broken: not a head's, or from a version of mien newer than this one."""
-    if data.get("format") != FORMAT:
-        raise Broken("format", f"expected {FORMAT!r}, found {data.get('format')!r}")
-    version = get(data, "version", int)
-    if version > VERSION:
-        raise Broken(
-            "version",
-            f"{version} was written by a newer mien ({data.get('generator', 'unknown')}); "
-            f"this one reads up to {VERSION}",
-        )
+def check_header(data: Json) -> None:
+    """Raises: Broken: not a head's, from a newer version of mien, in other units."""
+    check_format(data, FORMAT, VERSION)
+    units = as_object(need(data, "units", ""), "units")
+    for name, meant in UNITS.items():
+        as_choice(need(units, name, "units"), f"units.{name}", name, (meant,))
 
 
-def get(data: Json, key: str, kind: type[Kind], place: str = "") -> Kind:
-    """data[key], which must be of this kind. Raises: Broken."""
-    where = f"{place}.{key}" if place else key
-    if key not in data:
-        raise Broken(where, "missing")
-    value = data[key]
-    if kind is float and isinstance(value, int):
-        value = float(value)
-    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-        raise Broken(where, f"expected {_KIND_NAMES[kind]}, found {str(value)[:40]!r}")
-    return value
-
-
-def get_texts(data: Json, key: str, place: str = "") -> dict[str, str]:
+def texts_from_json(data: Json, key: str, place: str = "") -> dict[str, str]:
     """data[key], an object whose values are text. Raises: Broken."""
-    texts = get(data, key, dict, place)
-    return {name: get(texts, name, str, key) for name in texts}
+    texts = as_object(need(data, key, place), join(place, key))
+    return {name: as_text(text, join(join(place, key), name)) for name, text in texts.items()}
 
 
-def get_names(data: Json, key: str) -> tuple[str, ...]:
-    """data[key], a list of texts. Raises: Broken."""
-    names = get(data, key, list)
-    for name in names:
-        if not isinstance(name, str):
-            raise Broken(key, f"expected names, found {str(name)[:40]!r}")
-    return tuple(names)
-
-
-def get_path(data: Json, key: str, place: str = "") -> str:
-    """data[key], a path that stays inside the folder. Raises: Broken."""
-    path = get(data, key, str, place)
-    if not is_inside(path):
-        raise Broken(f"{place}.{key}", f"expected a path inside the folder, found {path!r}")
-    return path
+def texture_files(data: Json) -> dict[str, str]:
+    """Where in the folder each texture is. Raises: Broken: a path that leaves it."""
+    files = texts_from_json(data, "textures")
+    for name, path in files.items():
+        if not is_inside(path):
+            found = f"found {path[:60]!r}"
+            raise Broken(join("textures", name), f"expected a path inside the folder, {found}")
+    return files
 
 
 def is_inside(path: str) -> bool:
     """Whether a relative path, with forward slashes, leads to somewhere below its folder."""
     plain = PurePosixPath(path)
-    return bool(path) and not plain.is_absolute() and ".." not in plain.parts and "\\" not in path
+    inside = bool(path) and not plain.is_absolute() and ".." not in plain.parts
+    return inside and not set(path) & set("\\\0")
 
 
-def views_from_json(data: Json, expression: str) -> tuple[FittedView, ...]:
-    """The cameras of one expression. Raises: Broken; InputError: a camera that is none."""
-    place = f"expressions.{expression}.cameras"
-    items = get(get(data, expression, dict, "expressions"), "cameras", list, place[:-8])
-    return tuple(_view_from_json(item, f"{place}[{i}]") for i, item in enumerate(items))
+def views_from_json(data: Json, place: str) -> tuple[FittedView, ...]:
+    """The cameras of the expression at a place. Raises: Broken."""
+    place = f"{place}.cameras"
+    return tuple(
+        _view_from_json(as_object(item, f"{place}[{i}]"), f"{place}[{i}]")
+        for i, item in enumerate(as_list(need(data, "cameras", place[:-8]), place))
+    )
 
 
 def motion_from_json(data: Json, place: str) -> Json:
     """Units and gaze of an expression, as fields of model.head.Expression; a head of an older mien
     has none. Raises: Broken."""
-    units = get(data, "units", dict, place) if "units" in data else {}
-    weights = {name: get(units, name, float, f"{place}.units") for name in units}
+    units = as_object(data.get("units", {}), f"{place}.units")
+    low, high = UNIT_RANGE
+    weights = {
+        name: as_number(weight, join(f"{place}.units", name), least=low, most=high)
+        for name, weight in units.items()
+    }
     if "gaze_rad" not in data:
         return {"units": weights}
-    gaze = get(data, "gaze_rad", dict, place)
-    eyes = [get(gaze, eye, dict, f"{place}.gaze_rad") for eye in _EYES]
+    place = f"{place}.gaze_rad"
+    gaze = as_object(data["gaze_rad"], place)
+    eyes = [
+        (as_object(need(gaze, eye, place), join(place, eye)), join(place, eye)) for eye in _EYES
+    ]
     angles = [
-        [get(item, axis, float, f"{place}.gaze_rad.{eye}") for axis in ("yaw", "pitch")]
-        for eye, item in zip(_EYES, eyes, strict=True)
+        [
+            as_number(need(item, axis, at), join(at, axis), least=-np.pi, most=np.pi)
+            for axis in _AXES
+        ]
+        for item, at in eyes
     ]
     return {"units": weights, "gaze": np.array(angles)}
 
@@ -141,8 +144,11 @@ def shading_from_json(data: Json) -> dict[str, tuple[float, float, float]]:
     """Coefficients by part; a head of an older mien has the usual ones. Raises: Broken."""
     if "shading" not in data:
         return dict(SHADING)
-    shading = get(data, "shading", dict)
-    terms = {part: _get_array(shading, part, (3,), "shading").tolist() for part in shading}
+    shading = as_object(data["shading"], "shading", SHADING)
+    terms = {
+        part: as_array(need(shading, part, "shading"), f"shading.{part}", (3,)).tolist()
+        for part in SHADING
+    }
     return {part: (c0, c1, c2) for part, (c0, c1, c2) in terms.items()}
 
 
@@ -163,35 +169,30 @@ def _view_to_json(view: FittedView) -> Json:
     }
 
 
-def _view_from_json(item: object, place: str) -> FittedView:
-    if not isinstance(item, dict):
-        raise Broken(place, "expected an object")
-    camera = Camera(
-        width=get(item, "width", int, place),
-        height=get(item, "height", int, place),
-        focal_px=get(item, "focal_px", float, place),
-        R_cam_head=_get_array(item, "R_cam_head", (3, 3), place),
-        t_cam_head=_get_array(item, "t_cam_head_mm", (3,), place),
-        principal_px=_get_array(item, "principal_px", (2,), place),
-    )
-    return FittedView(
-        photo=get(item, "photo", str, place),
-        camera=camera,
-        rms_px=get(item, "rms_px", float, place),
-        points_used=get(item, "points_used", int, place),
-        distrusted=get_texts(item, "distrusted", place),
-        gains=_get_array(item, "gains", (3,), place) if "gains" in item else np.ones(3),
-    )
+def _view_from_json(item: Json, place: str) -> FittedView:
+    def numbers(key: str, *shape: int) -> Array:
+        return as_array(need(item, key, place), f"{place}.{key}", shape)
 
+    def side(key: str) -> int:
+        return as_whole(need(item, key, place), f"{place}.{key}", above=0, most=MAX_PHOTO_SIDE)
 
-def _get_array(data: Json, key: str, shape: tuple[int, ...], place: str) -> Array:
-    return check_array(f"{place}.{key}", get(data, key, list, place), shape)
-
-
-_KIND_NAMES: dict[type, str] = {
-    int: "a whole number",
-    float: "a number",
-    str: "text",
-    list: "a list",
-    dict: "an object",
-}
+    try:
+        camera = Camera(
+            width=side("width"),
+            height=side("height"),
+            focal_px=as_number(need(item, "focal_px", place), f"{place}.focal_px", above=0),
+            R_cam_head=numbers("R_cam_head", 3, 3),
+            t_cam_head=numbers("t_cam_head_mm", 3),
+            principal_px=numbers("principal_px", 2),
+        )
+        return FittedView(
+            photo=as_text(need(item, "photo", place), f"{place}.photo"),
+            camera=camera,
+            rms_px=as_number(need(item, "rms_px", place), f"{place}.rms_px", least=0),
+            points_used=as_whole(need(item, "points_used", place), f"{place}.points_used", least=0),
+            distrusted=texts_from_json(item, "distrusted", place),
+            gains=numbers("gains", 3) if "gains" in item else np.ones(3),
+        )
+    except InputError as error:
+        problem = f"expected {error.expected}, found {error.got}"
+        raise Broken(f"{place}.{error.name}", problem) from None

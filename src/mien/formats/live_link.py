@@ -69,15 +69,17 @@ def write_live_link(
     Raises: InputError: no moment, a unit that the format has no column for, a negative time, a
         place that cannot be written.
     """
-    rows = [_row(moment, units_of(moment.state)) for moment in moments]
-    if not rows:
-        raise InputError(path, "at least one frame to write", "none")
+    count = 0
     header = [TIMECODE, COUNT, *map(column_of, UNITS), *HEAD_COLUMNS, *EYE_COLUMNS]
     with atomic_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
-        writer.writerows(rows)
-    return len(rows)
+        for moment in moments:
+            writer.writerow(_row(moment, units_of(moment.state)))
+            count += 1
+        if not count:
+            raise InputError(path, "at least one frame to write", "none")
+    return count
 
 
 def column_of(unit: str) -> str:

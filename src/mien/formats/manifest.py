@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from mien.errors import MienError
-from mien.formats.strict_json import read_json
+from mien.strict_json import read_json
 
 MANIFEST = ".mien-files.json"
 KEPT = "kept"

@@ -85,16 +85,14 @@ def write_openface(
     """
     if not track.frames:
         raise InputError(path, "at least one frame to write", "none")
-    rows = []
-    for frame in track.frames:
-        state = frame.state
-        given = {} if state is None else units_of(state.face(track.layout))
-        rows.append([*_header_cells(frame), *_face_cells(state, given)])
     with atomic_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
-        writer.writerows(rows)
-    return len(rows)
+        for frame in track.frames:
+            state = frame.state
+            given = {} if state is None else units_of(state.face(track.layout))
+            writer.writerow([*_header_cells(frame), *_face_cells(state, given)])
+    return len(track.frames)
 
 
 def action_units(units: Mapping[str, float]) -> dict[str, float]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array
 from mien.assets.feature_points import FeatureLayout
-from mien.errors import FileFormatError, InputError
+from mien.errors import InputError, OtherPointsError
 from mien.formats.points_json import read_points_json, write_points_json
 from mien.formats.pts import IBUG_COUNT, points_from_ibug, points_to_ibug, read_pts, write_pts
 from mien.formats.tem import points_from_tem, points_to_tem, read_tem, write_tem
@@ -28,7 +28,7 @@ def read_points(
         path: `.json`, as `read_points_json` has it; `.tem` of Psychomorph or WebMorph; `.pts` of
             iBUG's 68 points. Of the last two, those that the layout shares are taken.
     Raises: InputError: another ending, a file that cannot be read. FileFormatError: not what its
-        ending says; another layout or template; says where.
+        ending says, another layout; says where. OtherPointsError: another template.
     """
     path = Path(path)
     read = _READERS[check_points_kind(path)]
@@ -76,7 +76,7 @@ def _from_tem(path: Path, layout: FeatureLayout) -> Named:
 def _from_pts(path: Path, layout: FeatureLayout) -> Named:
     points = read_pts(path)
     if len(points) != IBUG_COUNT:
-        raise FileFormatError(path, f"expected iBUG's {IBUG_COUNT} points, found {len(points)}")
+        raise OtherPointsError(path, f"expected iBUG's {IBUG_COUNT} points, found {len(points)}")
     return points_from_ibug(points, layout)
 
 

@@ -12,7 +12,7 @@ from mien.arrays import Array, Float, check_array
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_file
-from mien.formats.strict_json import (
+from mien.strict_json import (
     as_list,
     as_number,
     as_object,

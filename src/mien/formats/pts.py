@@ -11,11 +11,14 @@ from mien.arrays import Array, Float, check_array
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import FileFormatError
 from mien.formats.atomic import atomic_file
-from mien.formats.text_numbers import Numbers, read_ascii
+from mien.formats.text_numbers import Numbers
+from mien.limits import MAX_POINTS_BYTES
+from mien.reading import read_text
 
 __all__ = ["IBUG_SHARED", "points_from_ibug", "points_to_ibug", "read_pts", "write_pts"]
 
 IBUG_COUNT = 68
+_FILE = re.compile(r"\s*version:\s*1(?:\.0*)?\s+n_points:\s*(\d{1,5})\s*\{([^{}]*)\}\s*", re.ASCII)
 FIRST_CENTRE = 1.0
 """iBUG counts as Matlab does, the first pixel's centre at (1, 1); here it is at (0.5, 0.5)."""
 
@@ -74,8 +77,9 @@ def read_pts(path: str | Path) -> Float[Array, "n 2"]:
 
     Raises: InputError: the file cannot be read. FileFormatError: no such file; says where.
     """
-    text = read_ascii(path, "an iBUG .pts file")
-    found = re.fullmatch(r"\s*version:\s*1\s+n_points:\s*(\d{1,5})\s*\{(.*)\}\s*", text, re.DOTALL)
+    text = read_text(path, MAX_POINTS_BYTES, "an iBUG .pts file")
+    # What stands behind # or // is a comment; the line itself stays, for the count.
+    found = _FILE.fullmatch(re.sub(r"(#|//).*", "", text))
     if found is None:
         expected = "'version: 1', 'n_points: 68' and the points between { and }"
         raise FileFormatError(path, f"expected {expected}")

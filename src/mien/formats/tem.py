@@ -10,7 +10,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array
 from mien.assets.feature_points import FeatureLayout
-from mien.errors import FileFormatError, InputError
+from mien.errors import InputError, OtherPointsError
 from mien.formats.atomic import atomic_file
 from mien.formats.tem_templates import TEMPLATES
 from mien.formats.text_numbers import Numbers
@@ -96,7 +96,7 @@ def points_from_tem(
 
     Args:
         name: of the file, for messages.
-    Raises: FileFormatError: a template that is not in `TEMPLATES`.
+    Raises: OtherPointsError: a template that is not in `TEMPLATES`.
     """
     count = len(delineation.points)
     if count == len(layout.names):
@@ -106,4 +106,4 @@ def points_from_tem(
         return {name: delineation.points[index] for name, index in shared.items()}
     known = [f"{known} ({template.origin})" for known, template in TEMPLATES.items()]
     expected = f"{len(layout.names)} points ({layout.name}), {', '.join(known)}"
-    raise FileFormatError(name, f"expected {expected}, found {count}")
+    raise OtherPointsError(name, f"expected {expected}, found {count}")

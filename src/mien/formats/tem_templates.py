@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from mien.formats.pts import IBUG_SHARED
+
 __all__ = ["TEMPLATES", "TemTemplate"]
 
 
@@ -119,7 +121,21 @@ _FACE_RESEARCH_LAB = {
     "lower_lip_outer": 106,
     "menton": 129,
 }
+_DLIB_70 = {
+    "right_pupil": 0,
+    "left_pupil": 1,
+    **{name: 2 + number for number, name in IBUG_SHARED.items()},
+}
+_DLIB_7 = {
+    "left_eye_outer": 2,
+    "left_eye_inner": 3,
+    "right_eye_outer": 4,
+    "right_eye_inner": 5,
+    "nose_base": 6,
+}
 TEMPLATES = {
+    7: TemTemplate("dlib's 5 and the middles of the eyes", _DLIB_7),
+    70: TemTemplate("pupils and iBUG's 68", _DLIB_70),
     83: TemTemplate("Face++", _FACE_PP_83),
     106: TemTemplate("Face++", _FACE_PP_106),
     189: TemTemplate("Face Research Lab", _FACE_RESEARCH_LAB),
@@ -129,4 +145,8 @@ TEMPLATES = {
 Points of these and the detector agree, on the mean of a pair over four to six photos, to 3.4 % of
 the distance between the outer corners of the eyes; the menton of Face++ to 5 %. What looks alike
 but lies 4 to 10 % apart is left out: the middle of brows, rims of nostrils, the jaw.
+
+Of 7 and 70 points are those of webmorphR.dlib, which puts two for the eyes before dlib's own: of
+70 the means of the lids' points, of 7 those of the eyes' corners, which are no pupils.
+Source: https://github.com/debruine/webmorphR.dlib, dlib_auto_delin.R.
 """

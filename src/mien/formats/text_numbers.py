@@ -5,34 +5,27 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from mien.errors import FileFormatError, InputError
+from mien.errors import FileFormatError
+from mien.formats.csv_rows import number_in
+from mien.limits import LARGEST, MAX_POINTS_BYTES
+from mien.reading import read_text
 
 MOST = 100_000
 """No file of points means more; a number beyond is no count."""
 
 
-def read_ascii(path: str | Path, expected: str) -> str:
-    """The text of a file. Raises: InputError: unreadable. FileFormatError: other bytes; empty."""
-    try:
-        text = Path(path).read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise InputError(path, "a readable file", error.strerror or error) from None
-    except UnicodeDecodeError:
-        raise FileFormatError(path, f"expected {expected}, found other bytes") from None
-    if not text.strip():
-        raise FileFormatError(path, f"expected {expected}, found an empty file")
-    return text
-
-
 class Numbers:
     """Takes one number after the other from a file.
 
-    Raises: InputError: the file cannot be read. FileFormatError: no text, empty.
+    Args:
+        expected: what kind of file it should be, for messages.
+        text: of the file, for who has read it.
+    Raises: InputError: the file cannot be read. FileFormatError: no text, empty, too large.
     """
 
     def __init__(self, path: str | Path, expected: str, text: str | None = None) -> None:
         self._path = path
-        text = read_ascii(path, expected) if text is None else text
+        text = read_text(path, MAX_POINTS_BYTES, expected) if text is None else text
         self._words = [(n, w) for n, row in enumerate(text.splitlines(), 1) for w in row.split()]
         self._next = 0
 
@@ -47,12 +40,13 @@ class Numbers:
             raise FileFormatError(self._path, f"ends before {what}")
         line, word = self._words[self._next]
         self._next += 1
-        try:
-            value = float(word)
-        except ValueError:
-            value = math.nan
+        value = number_in(word)
         if not math.isfinite(value):
             problem = f"expected a finite number ({what}), found {word[:40]!r}"
+            raise FileFormatError(self._path, problem, f"line {line}")
+        if abs(value) > LARGEST:
+            limits = f"from {-LARGEST:g} to {LARGEST:g}"
+            problem = f"expected a number {limits} ({what}), found {word[:40]}"
             raise FileFormatError(self._path, problem, f"line {line}")
         return value
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from mien.animate.channels import MEMBERS, REGIONS, UNITS, split
 from mien.animate.timeline import Timeline, Tracks
 from mien.errors import FileFormatError
-from mien.formats.strict_json import unknown
+from mien.strict_json import unknown
 
 
 def check_timeline(

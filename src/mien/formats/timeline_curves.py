@@ -10,7 +10,7 @@ import numpy as np
 
 from mien.animate.curves import INTERPOLATIONS, MIN_STEP, Curve, constant
 from mien.errors import Broken
-from mien.formats.strict_json import as_choice, as_list, as_number, as_object, complain, need
+from mien.strict_json import as_choice, as_list, as_number, as_object, complain, need
 
 _KEY = ("time", "value", "interpolation", "in", "out")
 

@@ -18,7 +18,9 @@ from mien.animate.layers import GENERATORS, Generator
 from mien.animate.timeline import PIVOT_MM, Clip, Layer, Placement, Timeline, Tracks
 from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_file
-from mien.formats.strict_json import (
+from mien.formats.timeline_curves import curve_from_json, curve_to_json, tidy
+from mien.limits import MAX_FPS, MAX_SECONDS, MAX_SIDE, MIN_FPS
+from mien.strict_json import (
     as_choice,
     as_list,
     as_number,
@@ -30,13 +32,9 @@ from mien.formats.strict_json import (
     need,
     read_json,
 )
-from mien.formats.timeline_curves import curve_from_json, curve_to_json, tidy
 
 FORMAT = "mien timeline"
 VERSION = 1
-MAX_SECONDS = 86_400.0
-MAX_FPS = 1000.0
-MAX_SIDE = 16_384
 
 _MOTION = ("tracks", "play")
 _TOP = ("format", "version", "duration", "fps", "size", "pivot", *_MOTION, "clips", "layers")
@@ -87,7 +85,7 @@ def timeline_from_json(data: Mapping[str, Any]) -> Timeline:
     clips = as_object(top.get("clips", {}), "clips")
     return Timeline(
         duration=_duration(top, ""),
-        fps=as_number(top.get("fps", 30), "fps", above=0, most=MAX_FPS),
+        fps=as_number(top.get("fps", 30), "fps", least=MIN_FPS, most=MAX_FPS),
         size=_size(top["size"]) if "size" in top else None,
         pivot=np.array(_numbers(top.get("pivot", list(PIVOT_MM)), "pivot", 3)),
         tracks=_tracks(top, ""),
@@ -129,7 +127,7 @@ def _tracks(data: dict[str, Any], above: str) -> dict[str, Curve]:
     for group, members in as_object(data.get("tracks", {}), place, groups).items():
         inside = as_object(members, f"{place}.{group}", MEMBERS.get(group))
         for name, track in inside.items():
-            curve = curve_from_json(track, f"{place}.{group}.{name}")
+            curve = curve_from_json(track, join(f"{place}.{group}", name))
             channel = f"{group}.{name}"
             tracks[channel] = curve.scaled(math.pi / 180) if channel in ANGLES else curve
     return tracks

@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -19,6 +19,7 @@ from mien.errors import FileFormatError
 from mien.formats.atomic import atomic_file
 from mien.formats.csv_rows import finite_number, read_rows
 from mien.formats.track_json import check_sidecar, load_sidecar, sidecar_of, sidecar_text
+from mien.limits import MAX_FRAMES, MAX_SECONDS, UNIT_RANGE
 from mien.numeric.rotation import rotation_from_vector, rotation_to_vector
 from mien.track.state import STATUSES, Layout, Track, TrackedFrame, TrackState
 
@@ -87,20 +88,32 @@ def load_track(path: str | Path) -> Track:
     """
     path = Path(path)
     rows = read_rows(path, _KIND)
-    if tuple(rows[0][: len(FRAME)]) != FRAME:
-        found = ",".join(rows[0])[:40]
-        raise FileFormatError(path, f"expected {_KIND}, found {found!r}", "line 1")
+    line, header = next(rows)
+    if tuple(header[: len(FRAME)]) != FRAME:
+        found = ",".join(header)[:40]
+        raise FileFormatError(path, f"expected {_KIND}, found {found!r}", f"line {line}")
     empty = load_sidecar(sidecar_of(path))
     columns = columns_of(empty.layout)
-    _check_columns(path, rows[0], columns)
-    cells = [_Cells(path, n, columns, row) for n, row in enumerate(rows[1:], 2) if any(row)]
-    frames = tuple(_frame(row, empty.layout) for row in cells)
-    for row, before, after in zip(cells[1:], frames, frames[1:], strict=False):
-        if after.frame <= before.frame:
-            row.refuse("frame", f"a number above {before.frame}", str(after.frame))
-        if after.time < before.time:
-            row.refuse("time", f"{before.time:g} s or later", f"{after.time:g} s")
-    return Track(empty.layout, empty.width, empty.height, empty.focal_px, empty.fps, frames)
+    _check_columns(path, header, columns)
+    frames: list[TrackedFrame] = []
+    for number, row in rows:
+        cells = _Cells(path, number, columns, row)
+        frames.append(_frame(cells, empty.layout))
+        _check_order(cells, frames)
+    return replace(empty, frames=tuple(frames))
+
+
+def _check_order(cells: _Cells, frames: Sequence[TrackedFrame]) -> None:
+    """Refuse the last frame where it does not follow, or leads too far."""
+    first, before, last = frames[0], frames[-2:][0], frames[-1]
+    if len(frames) > 1 and last.frame <= before.frame:
+        cells.refuse("frame", f"a number above {before.frame}", str(last.frame))
+    if last.time < before.time:
+        cells.refuse("time", f"{before.time:g} s or later", f"{last.time:g} s")
+    if last.time - first.time > MAX_SECONDS - 1:
+        cells.refuse("time", f"at most {MAX_SECONDS:g} s", f"{last.time:g} s")
+    if len(frames) > MAX_FRAMES:
+        cells.refuse("frame", f"at most {MAX_FRAMES} frames", "more")
 
 
 @dataclass(frozen=True)
@@ -174,7 +187,7 @@ def _cell(number: float) -> str:
 
 def _frame(cells: _Cells, layout: Layout) -> TrackedFrame:
     number = cells.text("frame")
-    if not (number.isascii() and number.isdigit()):
+    if not (number.isascii() and number.isdigit() and len(number) <= 9):
         cells.refuse("frame", "a whole number", repr(number))
     status = cells.text("status")
     if status not in STATUSES:
@@ -213,11 +226,16 @@ def _state(cells: _Cells, layout: Layout) -> TrackState:
     for region, row in zip(layout.regions, weights, strict=True):
         if abs(row.sum() - 1) > _SUM_TOLERANCE:
             cells.refuse(region, "weights that sum to 1", f"{row.sum():g}")
+    units = values[known : known + len(layout.units)]
+    low, high = UNIT_RANGE
+    for name, unit in zip(layout.units, units, strict=True):
+        if not low <= unit <= high:
+            cells.refuse(f"units.{name}", f"a weight from {low} to {high}", f"{unit:g}")
     return TrackState(
         R_cam_head=rotation_from_vector(pose[:3]),
         t_cam_head=pose[3:],
         weights=weights,
-        units=values[known : known + len(layout.units)],
+        units=units,
         gaze=values[known + len(layout.units) :],
     )
 

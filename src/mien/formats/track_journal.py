@@ -13,20 +13,35 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TextIO
+from typing import Any, BinaryIO, TextIO, cast
 
 import numpy as np
 
-from mien.arrays import Array
+from mien.arrays import Array, Float
 from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_file
-from mien.formats.strict_json import check_format, join
-from mien.track.state import TrackedFrame, TrackState
+from mien.limits import MAX_TABLE_BYTES
+from mien.reading import check_file
+from mien.strict_json import (
+    as_choice,
+    as_list,
+    as_number,
+    as_object,
+    as_whole,
+    check_format,
+    join,
+    need,
+    parse_json,
+)
+from mien.track.state import STATUSES, Layout, Status, TrackedFrame, TrackState
 
 FORMAT = "mien track journal"
 VERSION = 1
 FLUSH_SECONDS = 0.5
 """A killed run loses the frames of this time, and the one it was at."""
+
+_FRAME = ("frame", "time", "status", "state", "rms", "seen", "deviations", "gain", "bias")
+_STATE = ("R_cam_head", "t_cam_head", "weights", "weights_shape", "units", "gaze")
 
 Json = dict[str, Any]
 
@@ -42,10 +57,13 @@ class Journal:
 
     Leaving its `with` block closes it and keeps the file: a run that fails can go on, too. `remove`
     when the result is written.
+
+    Attributes:
+        path: the file.
     """
 
     def __init__(self, path: Path, file: TextIO, clock: Callable[[], float]) -> None:
-        self._path, self._file, self._clock = path, file, clock
+        self.path, self._file, self._clock = path, file, clock
         self._flushed = clock()
 
     @classmethod
@@ -79,7 +97,7 @@ class Journal:
 
         Raises: InputError: the place cannot be written any more.
         """
-        with _writing(self._path):
+        with _writing(self.path):
             self._file.write(_line_of(frame))
             if self._clock() - self._flushed >= FLUSH_SECONDS:
                 self._file.flush()
@@ -87,13 +105,13 @@ class Journal:
 
     def close(self) -> None:
         """Write what is left and keep the file. Raises: InputError: as append."""
-        with _writing(self._path):
+        with _writing(self.path):
             self._file.close()
 
     def remove(self) -> None:
         """Close it and delete the file. Raises: InputError: as append."""
         self.close()
-        self._path.unlink(missing_ok=True)
+        self.path.unlink(missing_ok=True)
 
     def __enter__(self) -> Journal:
         return self
@@ -107,33 +125,57 @@ class Journal:
         self.close()
 
 
-def load_journal(path: str | Path, header: Mapping[str, Any]) -> tuple[TrackedFrame, ...]:
+def load_journal(
+    path: str | Path, header: Mapping[str, Any], layout: Layout
+) -> tuple[TrackedFrame, ...]:
     """The frames that an unfinished run has kept; a last line that was cut off is left out.
 
     Args:
         header: of the run that wants to go on.
+        layout: of its frames.
     Raises:
         InputError: the file cannot be read; another run's journal: names what differs.
-        FileFormatError: no journal, a newer version, a line that holds no frame.
+        FileFormatError: no journal, a newer version; a line that holds no frame, or another one
+            than that which follows.
     """
-    path = Path(path)
+    path = check_file(path, MAX_TABLE_BYTES)
+    frames: list[TrackedFrame] = []
     try:
-        # What follows the last line break is what was being written, or nothing.
-        lines = path.read_bytes().split(b"\n")[:-1]
+        with path.open("rb") as file:
+            lines = _whole_lines(file)
+            _check_header(path, next(lines, b""), json.loads(json.dumps(header)))
+            for number, line in enumerate(lines, 2):
+                frames.append(_frame(path, number, line, layout, frames))
     except OSError as error:
         raise InputError(path, "a readable file", error.strerror or error) from None
-    _check_header(path, lines[0] if lines else b"", json.loads(json.dumps(header)))
-    return tuple(_frame(path, number, line) for number, line in enumerate(lines[1:], 2))
+    return tuple(frames)
+
+
+def _whole_lines(file: BinaryIO) -> Iterator[bytes]:
+    """Every line but what follows the last line break: that was being written, or is nothing."""
+    for line in file:
+        if line.endswith(b"\n"):
+            yield line
+
+
+def _parsed(path: Path, number: int, line: bytes, expected: str) -> Json:
+    """Raises: FileFormatError: no object."""
+    try:
+        data = parse_json(path, line.decode("utf-8"), line=number)
+    except UnicodeDecodeError:
+        data = None
+    if not isinstance(data, dict):
+        problem = f"expected {expected}, found {line[:40].decode(errors='replace')!r}"
+        raise FileFormatError(path, problem, f"line {number}")
+    return data
 
 
 def _check_header(path: Path, line: bytes, run: Json) -> None:
     try:
-        top = json.loads(line)
+        top = _parsed(path, 1, line or b"null", "the journal of an unfinished track")
         check_format(top, FORMAT, VERSION)
     except Broken as broken:
-        raise FileFormatError(path, broken.problem, broken.place) from None
-    except (ValueError, AttributeError):
-        raise FileFormatError(path, "expected the journal of an unfinished track") from None
+        raise FileFormatError(path, broken.problem, f"line 1, {broken.place}") from None
     different = next(_differences(top.get("run"), run), None)
     if different:
         place, kept, wanted = different
@@ -180,33 +222,75 @@ def _numbers(array: Array) -> list[float]:
     return numbers
 
 
-def _frame(path: Path, number: int, line: bytes) -> TrackedFrame:
+def _frame(
+    path: Path, number: int, line: bytes, layout: Layout, before: Sequence[TrackedFrame]
+) -> TrackedFrame:
+    """The frame in a line, which follows those before it."""
+    data = _parsed(path, number, line, "a frame of a track")
     try:
-        data = json.loads(line)
+        as_object(data, "", _FRAME)
+        index = as_whole(need(data, "frame", ""), "frame", least=0)
+        if index != len(before):
+            raise Broken("frame", f"expected {len(before)}, found {index}")
+        seconds = as_number(need(data, "time", ""), "time")
+        if before and seconds < before[-1].time:
+            raise Broken("time", f"expected {before[-1].time:g} s or later, found {seconds:g} s")
+        status = as_choice(need(data, "status", ""), "status", "status", STATUSES)
+        given = need(data, "state", "")
+        if (given is None) != (status == "lost"):
+            raise Broken(
+                "state", f"expected {'none' if given else 'one'} of a frame that is {status}"
+            )
+        channels, known = len(layout.channels), given is not None
+        match = [_floats(need(data, key, ""), key, 3, finite=known) for key in ("gain", "bias")]
+        rms, seen = _floats([need(data, "rms", ""), need(data, "seen", "")], "rms", 2, finite=known)
         return TrackedFrame(
-            frame=data["frame"],
-            time=data["time"],
-            status=data["status"],
-            state=None if data["state"] is None else _state_from_json(data["state"]),
-            rms=data["rms"],
-            seen=data["seen"],
-            deviations=np.array(data["deviations"]),
-            gain=np.array(data["gain"]),
-            bias=np.array(data["bias"]),
+            frame=index,
+            time=seconds,
+            status=cast(Status, status),
+            state=None if given is None else _state_from_json(as_object(given, "state"), layout),
+            rms=float(rms),
+            seen=float(seen),
+            deviations=_floats(need(data, "deviations", ""), "deviations", channels, finite=False),
+            gain=match[0],
+            bias=match[1],
         )
-    except (ValueError, KeyError, TypeError):
-        problem = f"expected a frame of a track, found {line[:40].decode(errors='replace')!r}"
-        raise FileFormatError(path, problem, f"line {number}") from None
+    except Broken as broken:
+        place = f"line {number}, {broken.place}"
+        raise FileFormatError(path, broken.problem, place) from None
+    except InputError as error:
+        problem = f"expected {error.expected}, found {error.got}"
+        raise FileFormatError(path, problem, f"line {number}, {error.name}") from None
 
 
-def _state_from_json(data: Json) -> TrackState:
-    return TrackState(
-        R_cam_head=np.reshape(data["R_cam_head"], (3, 3)),
-        t_cam_head=np.array(data["t_cam_head"]),
-        weights=np.reshape(data["weights"], data["weights_shape"]),
-        units=np.array(data["units"]),
-        gaze=np.array(data["gaze"]),
-    )
+def _state_from_json(data: Json, layout: Layout) -> TrackState:
+    as_object(data, "state", _STATE)
+    shape = (len(layout.regions), len(layout.expressions))
+    if need(data, "weights_shape", "state") != list(shape):
+        found = str(data["weights_shape"])[:40]
+        raise Broken("state.weights_shape", f"expected {list(shape)}, found {found}")
+    counts = {"R_cam_head": 9, "t_cam_head": 3, "weights": shape[0] * shape[1]}
+    counts |= {"units": len(layout.units), "gaze": 2}
+    arrays = {
+        name: _floats(need(data, name, "state"), f"state.{name}", count, finite=True)
+        for name, count in counts.items()
+    }
+    arrays |= {
+        "R_cam_head": arrays["R_cam_head"].reshape(3, 3),
+        "weights": arrays["weights"].reshape(shape),
+    }
+    return TrackState(**arrays)
+
+
+def _floats(value: object, place: str, count: int, *, finite: bool) -> Float[Array, " n"]:
+    """(count,) numbers; NaN among them unless they must be finite. Raises: Broken."""
+    items = as_list(value, place)
+    if len(items) != count:
+        raise Broken(place, f"expected {count} numbers, found {len(items)}")
+    for index, item in enumerate(items):
+        if finite or item == item:
+            as_number(item, f"{place}[{index}]")
+    return np.array(items, dtype=np.float64)
 
 
 @contextmanager

@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from mien.errors import Broken, FileFormatError, InputError
-from mien.formats.strict_json import (
-    as_list,
+from mien.limits import MAX_FPS, MAX_PHOTO_SIDE, MIN_FPS
+from mien.strict_json import (
+    as_names,
     as_number,
-    as_text,
     as_whole,
     check_format,
     need,
@@ -77,22 +76,17 @@ def load_sidecar(path: Path) -> Track:
     data = read_json(path)
     try:
         check_format(data, FORMAT, VERSION)
-        width, height = (as_whole(need(data, key, ""), key, above=0) for key in ("width", "height"))
-        focal_px, fps = (
-            as_number(need(data, key, ""), key, above=0) for key in ("focal_px", "fps")
+        width, height = (
+            as_whole(need(data, key, ""), key, above=0, most=MAX_PHOTO_SIDE)
+            for key in ("width", "height")
         )
-        layout = Layout(*(_names(data, key) for key in ("regions", "expressions", "units")))
+        focal_px = as_number(need(data, "focal_px", ""), "focal_px", above=0)
+        fps = as_number(need(data, "fps", ""), "fps", least=MIN_FPS, most=MAX_FPS)
+        names = (as_names(need(data, key, ""), key) for key in ("regions", "expressions", "units"))
+        layout = Layout(*names)
     except Broken as broken:
         raise FileFormatError(path, broken.problem, broken.place) from None
     except InputError as error:
         problem = f"expected {error.expected}, found {error.got}"
         raise FileFormatError(path, problem, error.name) from None
     return Track(layout, width, height, focal_px, fps, ())
-
-
-def _names(data: dict[str, Any], key: str) -> tuple[str, ...]:
-    names = [as_text(name, key) for name in as_list(need(data, key, ""), key)]
-    for name in names:
-        if names.count(name) > 1:
-            raise Broken(key, f"{name!r} appears twice")
-    return tuple(names)

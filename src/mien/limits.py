@@ -1,0 +1,50 @@
+"""How much of anything is read and made; beyond, a clear refusal before any work (docs/limits.md).
+
+Every limit has its number here alone.
+"""
+
+from __future__ import annotations
+
+MIB = 1 << 20
+
+MAX_SECONDS = 86_400.0
+"""Of a timeline, a clip within one, a track, a recording: a day."""
+MAX_FPS = 1000.0
+"""Frames a second of a timeline, a track, a recording, of what is made of them."""
+MIN_FPS = 0.01
+"""Frames a second of what is made of a performance, at least."""
+MAX_FRAMES = 1_000_000
+"""Of a performance, a track, a recording: four and a half hours at 60 frames a second."""
+MAX_GAP_SECONDS = 3600.0
+"""Between two frames of a Live Link recording."""
+MAX_SIDE = 8192
+"""px, of a picture that is drawn, of a texture."""
+MAX_PHOTO_SIDE = 65_535
+"""px, of a photo or a video that a camera belongs to: a JPEG's own limit."""
+MAX_MM = 10_000.0
+"""Of a vertex' coordinate and of a face unit's offset, from 0 either way."""
+
+UNIT_RANGE = (-0.5, 1.5)
+"""Weight of a face unit, the lowest and the highest: as those of photographed expressions."""
+
+LARGEST = 1e9
+"""No number in a document is larger: sums and products of such stay exact enough."""
+MAX_DIGITS = 1000
+"""Of a whole number in a JSON document."""
+MAX_DEPTH = 64
+"""Lists and objects within each other in a JSON document."""
+MAX_CONTAINERS = 4_000_000
+"""Lists and objects in a JSON document altogether."""
+MAX_JSON_BYTES = 64 * MIB
+"""Of a JSON document, and of a line of a journal."""
+MAX_TABLE_BYTES = 256 * MIB
+"""Of a track's or a recording's .csv, and of a journal."""
+MAX_POINTS_BYTES = 4 * MIB
+"""Of a .tem or .pts."""
+
+MAX_ARRAY_BYTES = 512 * MIB
+"""Of one array in an .npz, unpacked."""
+MAX_ARRAYS_BYTES = 1024 * MIB
+"""Of all that are taken from one .npz together, unpacked."""
+MAX_ARRAYS = 10_000
+"""How many arrays an .npz holds, wanted or not."""
