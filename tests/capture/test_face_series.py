@@ -52,7 +52,7 @@ def test_a_folder_of_photos(folder: Path, detector: LandmarkDetector) -> None:
     assert seen == [(200, 150, 3, 478, 2)] * 2
     assert told == [(1, 3), (2, 3), (3, 3)]
     np.testing.assert_array_equal(series.sizes, [[150, 200]] * 2)
-    assert "left.png: scaled from 300x400 to 150x200" in series.notes
+    assert "left.png, right.png: scaled from 300x400 to 150x200" in series.notes
     # Landmarks are in px of what comes when the pictures are asked for.
     (row, photo), *_ = load_pictures(series, [1])
     assert (row, photo.name, photo.size) == (1, "right.png", (150, 200))

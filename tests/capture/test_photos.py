@@ -95,8 +95,8 @@ def test_heic(tmp_path: Path) -> None:
     assert np.abs(photo.pixels.astype(int) - flat).max() <= 4
 
 
-@pytest.mark.parametrize("turn", range(1, 9))
-def test_exif_orientation(picture: Array, tmp_path: Path, turn: int) -> None:
+def lying(picture: Array, turn: int) -> Array:
+    """As a file with this orientation stores the picture."""
     stored = {
         1: picture,
         2: picture[:, ::-1],
@@ -107,11 +107,69 @@ def test_exif_orientation(picture: Array, tmp_path: Path, turn: int) -> None:
         7: picture[::-1, ::-1].transpose(1, 0, 2),
         8: np.rot90(picture, -1),
     }[turn]
+    return np.ascontiguousarray(stored)
+
+
+def oriented(turn: int) -> Image.Exif:
     exif = Image.Exif()
     exif[0x0112] = turn
-    photo = load_photo(saved(np.ascontiguousarray(stored), tmp_path / "a.png", exif=exif))
-    np.testing.assert_array_equal(photo.pixels, picture)
-    assert photo.original_size == (40, 30)
+    return exif
+
+
+@pytest.mark.parametrize("turn", range(1, 9))
+@pytest.mark.parametrize("kind", ["png", "tif", "lzw.tif", "jpg", "webp", "avif", "heic"])
+def test_orientation(tmp_path: Path, turn: int, kind: str) -> None:
+    """Quadrants of four colours, so that a turn too many or a mirrored picture shows."""
+    import pillow_heif
+
+    pillow_heif.register_heif_opener()
+    picture = np.zeros((64, 96, 3), np.uint8)
+    picture[:32, :48], picture[:32, 48:], picture[32:, :48] = (200, 90, 60), (60, 190, 80), 128
+    path = tmp_path / f"a.{kind}"
+    options = {"lzw.tif": {"compression": "tiff_lzw"}, "jpg": {"quality": 95}}.get(kind, {})
+    Image.fromarray(lying(picture, turn)).save(path, exif=oriented(turn), **options)
+    for side, step in ((4096, 1), (48, 2)):
+        photo = load_photo(path, max_side=side)
+        assert photo.original_size == (96, 64)
+        assert photo.pixels.shape == picture[::step, ::step].shape
+        off = np.abs(photo.pixels.astype(int) - picture[::step, ::step])
+        assert np.median(off) <= 4
+        assert off.mean() < 12
+
+
+@pytest.mark.parametrize("turn", range(1, 9))
+def test_heic_as_phones_write_it(tmp_path: Path, turn: int) -> None:
+    """The container turns the picture, and EXIF says the same once more."""
+    import pillow_heif
+
+    picture = np.full((64, 96, 3), 128, np.uint8)
+    picture[:32, :48], picture[:32, 48:] = (200, 90, 60), (60, 190, 80)
+    image = pillow_heif.from_pillow(Image.fromarray(lying(picture, turn)))
+    image.save(tmp_path / "a.heic", exif=oriented(turn).tobytes())
+    assert (b"irot" in (tmp_path / "a.heic").read_bytes()) == (turn in (3, 5, 6, 7, 8))
+    photo = load_photo(tmp_path / "a.heic")
+    assert photo.pixels.shape == picture.shape
+    assert np.abs(photo.pixels.astype(int) - picture).mean() < 12
+
+
+@pytest.mark.parametrize("turn", range(1, 9))
+@pytest.mark.parametrize("ending", ["png", "tif"])
+def test_orientation_keeps_every_pixel(
+    picture: Array, tmp_path: Path, turn: int, ending: str
+) -> None:
+    path = saved(lying(picture, turn), tmp_path / f"a.{ending}", exif=oriented(turn))
+    np.testing.assert_array_equal(load_photo(path).pixels, picture)
+
+
+def test_the_handed_tiffs_stand_upright(shared: Path) -> None:
+    """James's photos, stored lying."""
+    folder = shared / "data/cases/tiff_orientation/photos"
+    for side in ("left", "right"):
+        photo = load_photo(folder / f"{side}.tif", max_side=400)
+        with Image.open(shared / f"data/james/photo_{side}.png") as image:
+            original = np.asarray(image.convert("RGB").resize(photo.size))
+        assert photo.size == (300, 400)
+        assert np.abs(photo.pixels.astype(int) - original).mean() < 8
 
 
 def test_senseless_orientation_is_upright(picture: Array, tmp_path: Path) -> None:

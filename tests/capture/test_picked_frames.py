@@ -9,8 +9,10 @@ import pytest
 from clips import scored
 from filmed import grey, written
 from mien.arrays import Array
-from mien.capture.detector import LandmarkDetector
+from mien.capture.detector import LandmarkDetector, NoFaceError
+from mien.capture.landmarks import Landmarks
 from mien.capture.mediapipe_face import LOWER_LIP, UPPER_LIP, DetectedFace
+from mien.capture.photos import Photo
 from mien.capture.picked_frames import pick_frames
 from mien.errors import EstimationError, InputError
 
@@ -50,6 +52,9 @@ PLAYED = {40: scored(), 80: scored(mouthSmile=0.9), 120: scored(jawOpen=0.7)}
 
 class Audience:
     """A detector that sees the actor in them."""
+
+    def detect(self, photo: Photo, *, face: int | None = None) -> Landmarks:
+        raise NoFaceError(photo.name)
 
     def detect_fast(self, pixels: Array) -> DetectedFace | None:
         level = 40 * round(pixels.mean() / 40)

@@ -14,6 +14,7 @@ from mien.app.cli_synthesize import synthesize
 from mien.app.cli_track import track
 from mien.app.options import (
     check_finite,
+    check_given,
     parse_colour,
     parse_count,
     parse_size,
@@ -272,6 +273,7 @@ def main(arguments: list[str] | None = None) -> int:
     debug = "--debug" in arguments
     arguments = [argument for argument in arguments if argument != "--debug"]
     try:
+        check_given(arguments)
         # An interrupted command comes back as its exit status, a finished one as None.
         return app(args=arguments, prog_name="mien", standalone_mode=False) or 0
     except Exception as error:

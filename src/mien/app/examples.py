@@ -25,15 +25,14 @@ from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.detector import LandmarkDetector
 from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of, rows_of
+from mien.capture.notes import gathered_notes
 from mien.capture.photos import Photo, load_photo
-from mien.errors import InputError
 from mien.formats.atomic import atomic_folder
 from mien.formats.example_folder import (
     check_example_place,
     is_example_folder,
     write_example_files,
 )
-from mien.formats.head_folder import is_head_folder
 from mien.formats.image import encode_image
 from mien.formats.manifest import kept_notes
 from mien.report.example_sheet import example_sheet
@@ -123,9 +122,6 @@ def write_example_folder(
         `gather_examples`, a source that mien made, and a place that holds something else.
     """
     tell = progress or (lambda stage, done, total: None)
-    for kind, found in (("an example", is_example_folder), ("a head", is_head_folder)):
-        if found(Path(source)):
-            raise InputError(source, "photos or a video", f"{kind} folder that mien made of them")
     check_example_place(folder, read=[source])
     gathered = gather_examples(source, request=request, progress=tell)
     tell(WRITING, 0, 0)
@@ -227,9 +223,9 @@ def _marks(series: FaceSeries, layout: FeatureLayout) -> dict[int, Marks]:
 
 def _notes(plan: ExamplePlan, series: FaceSeries, marks: dict[int, Marks]) -> list[str]:
     """How many pictures were what, and what is missing."""
-    notes = [
-        f"{series.names[row]}: {len(found)} points marked by hand" for row, found in marks.items()
-    ]
+    notes = gathered_notes(
+        (series.names[row], f"{len(found)} points marked by hand") for row, found in marks.items()
+    )
     counts = Counter(_kind(reason) for reason in plan.choice.reasons)
     counts[NO_FACE] = len(series.left_out)
     kinds = ("chosen", *KINDS.values(), NO_FACE)

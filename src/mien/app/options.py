@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from math import inf, isfinite, radians
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,22 @@ if TYPE_CHECKING:
     from mien.expressions.state import FaceState
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,3})?", re.ASCII | re.IGNORECASE)
+
+
+def check_given(arguments: Sequence[str]) -> None:
+    """Refuse arguments that are empty: as a path, they would mean the current folder.
+
+    Raises: InputError: names the option, or the place among the arguments.
+    """
+    for place, argument in enumerate(arguments):
+        before = arguments[place - 1] if place else ""
+        if argument == "":
+            name = (
+                before if before.startswith("-") else f"argument {place} of `mien {arguments[0]}`"
+            )
+            raise InputError(name, "something", "an empty argument")
+        if argument.startswith("--") and argument.endswith("="):
+            raise InputError(argument[:-1], "something after =", "nothing")
 
 
 def check_finite(name: str, value: float) -> float:

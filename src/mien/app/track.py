@@ -16,6 +16,8 @@ from mien.app.track_lens import LENS, find_focal
 from mien.app.track_run import TRACKING, TrackRun
 from mien.arrays import check_positive
 from mien.capture.detector import LandmarkDetector
+from mien.capture.files import named_path
+from mien.capture.upright import turn_upright
 from mien.capture.video import Video
 from mien.formats.track_journal import journal_of
 from mien.model.head import Head
@@ -96,7 +98,7 @@ def track_video(
         used, a lens, a journal of another run.
     """
     tell = progress or (lambda stage, done, total: None)
-    clip = Video(Path(video))
+    clip = Video(named_path("video", video, "a video"))
     files.check(clip.path)
     if smooth_seconds is not None:
         check_positive("smooth_seconds", smooth_seconds)
@@ -104,6 +106,9 @@ def track_video(
     focal_px = None if lens is None else parse_lens(lens, facts.width, facts.height)
     notes = [STARTED_OVER] if journal_of(files.table).exists() and not resume else []
     with LandmarkDetector() as detector:
+        if turn_upright(clip, detector):
+            facts = clip.facts()
+            focal_px = None if lens is None else parse_lens(lens, facts.width, facts.height)
         ready = ReadyHead(head, detector, options or TrackOptions())
         if focal_px is None:
             focal_px, note = find_focal(clip, facts, ready, tell)
@@ -117,7 +122,7 @@ def track_video(
             seconds = time.perf_counter() - start
             track = run.track(tracker.layout, frames)
             shown = track if smooth_seconds is None else smooth(track, smooth_seconds)
-            notes += [*clip.notes, *_lost_notes(frames), *files.write(shown, clip.path, head, tell)]
+            notes += [*clip.notes, *_lost_notes(frames), *files.write(shown, clip, head, tell)]
             journal.remove()
     return _summary(track, len(kept), seconds, notes)
 

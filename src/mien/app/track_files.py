@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from mien.animate.tracked import track_moments
 from mien.app.explained import units_of
+from mien.capture.video import Video
 from mien.errors import InputError
 from mien.formats.atomic import check_file_place, check_files_apart
 from mien.formats.live_link import write_live_link
@@ -66,7 +67,7 @@ class TrackFiles:
         for path in filter(None, (self.live_link, self.openface)):
             check_file_place(path)
 
-    def write(self, track: Track, video: Path, head: Head, tell: Progress) -> Iterator[str]:
+    def write(self, track: Track, video: Video, head: Head, tell: Progress) -> Iterator[str]:
         """Write all of them, the table first.
 
         Args:
@@ -87,7 +88,7 @@ class TrackFiles:
 
             self._draw(track, video, HeadRenderer(head), tell)
 
-    def _draw(self, track: Track, video: Path, renderer: HeadRenderer, tell: Progress) -> None:
+    def _draw(self, track: Track, video: Video, renderer: HeadRenderer, tell: Progress) -> None:
         if self.overlay:
             from mien.report.track_overlay import write_overlay
 
@@ -98,7 +99,7 @@ class TrackFiles:
             write_track_plots(
                 self.plots,
                 track,
-                title=video.name,
+                title=video.path.name,
                 video=video,
                 head=renderer,
                 progress=partial(tell, PLOTS),

@@ -15,6 +15,7 @@ from mien.app.track_run import VideoTracker, mean_rate
 from mien.arrays import Array, UInt8
 from mien.capture.detector import LandmarkDetector
 from mien.capture.live_source import LiveSource
+from mien.capture.video import Video
 from mien.model.head import Head
 from mien.render.picture import GREY, HeadRenderer, render_head
 from mien.track.lens import expected_focal, parse_lens
@@ -60,7 +61,7 @@ def track_live_video(
         )
     notes = summary.notes
     if files is not None:
-        notes += tuple(files.write(take.track(), Path(source), head, lambda *step: None))
+        notes += tuple(files.write(take.track(), Video(Path(source)), head, lambda *step: None))
     return replace(summary, notes=notes)
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
 FILM_DIAGONAL_MM = math.hypot(36, 24)
 """43.27 mm. CIPA DCG-001 and EXIF 2.3 compare the *diagonals* of sensor and 35 mm film."""
 
+_HEIF_TURN, _HEIF_HEAD = "original_orientation", 1 << 16
 _ORIENTATION, _EXIF_IFD = 0x0112, 0x8769
 _FOCAL_LENGTH, _FOCAL_LENGTH_35MM = 0x920A, 0xA405
 _PIXEL_X, _PIXEL_Y = 0xA002, 0xA003
@@ -21,9 +23,23 @@ _CROP_TOLERANCE = 0.01
 
 
 def orientation(image: Image) -> int:
-    """EXIF orientation, 1 (upright) to 8; 1 when absent or senseless."""
+    """How the pixels are still to be turned, 1 (upright) to 8; 1 when absent or senseless.
+
+    Of an image whose pixels are loaded, for some decoders turn them themselves then.
+    """
     turn = image.getexif().get(_ORIENTATION, 1)
+    if image.format == "HEIF":
+        # Where the container says it, the pixels are turned already, and what EXIF says is void.
+        path = Path(cast(Any, image).filename)
+        turn = 1 if _turned_by_container(path) else image.info.get(_HEIF_TURN) or 1
     return turn if turn in range(1, 9) else 1
+
+
+def _turned_by_container(path: Path) -> bool:
+    """Whether a HEIC names a turn or a mirror among the properties at its beginning."""
+    with path.open("rb") as file:
+        head = file.read(_HEIF_HEAD)
+    return b"irot" in head or b"imir" in head
 
 
 def focal_prior_px(image: Image) -> tuple[float | None, list[str]]:

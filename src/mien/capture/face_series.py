@@ -17,9 +17,12 @@ from mien.capture.frame_photos import fetch_frames, frame_name
 from mien.capture.frames_ahead import frames_ahead
 from mien.capture.landmarks import Landmarks
 from mien.capture.mediapipe_face import DetectedFace
+from mien.capture.notes import gathered_notes
 from mien.capture.photos import Photo, load_photo
 from mien.capture.sharpness import face_sharpness
-from mien.capture.video import VIDEO_SUFFIXES, Video
+from mien.capture.source_kind import kind_of_source
+from mien.capture.upright import turn_upright
+from mien.capture.video import Video
 from mien.errors import EstimationError, InputError
 
 __all__ = ["FaceSeries", "Look", "find_faces", "load_pictures", "row_of", "rows_of"]
@@ -45,6 +48,7 @@ class FaceSeries:
         scores: of the same; `index` counts frames or photos from 0.
         seconds: of a video's frames, since its beginning.
         max_side: px; larger pictures are reduced to it.
+        quarters: turns counterclockwise of a video's frames, beyond what its file says.
         left_out: why, by name, of the pictures in which no face can be used.
         notes: what was odd.
     """
@@ -60,6 +64,7 @@ class FaceSeries:
     max_side: int
     left_out: dict[str, str]
     notes: tuple[str, ...]
+    quarters: int = 0
 
     def __len__(self) -> int:
         """How many pictures show the face."""
@@ -84,9 +89,9 @@ def find_faces(
     Raises: InputError, FileFormatError: no such source, damaged, not a video, no photo in it; a
         `face` of a video. EstimationError: no picture shows a face.
     """
-    source = Path(source)
+    kind, source = kind_of_source(source), Path(source)
     gathered = _Gathered(source, max_side, look or (lambda pixels, landmarks: None))
-    if source.is_file() and source.suffix.lower() in VIDEO_SUFFIXES:
+    if kind == "video":
         if face is not None:
             raise InputError("--face", "photos to choose a face in", f"a video, {source.name}")
         gathered.read_video(detector, report)
@@ -108,7 +113,7 @@ def load_pictures(
     by_frame = {int(series.scores.index[row]): row for row in rows}
     last = max(by_frame, default=0)
     for index, photo in fetch_frames(
-        Video(series.source),
+        Video(series.source, series.quarters),
         by_frame,
         series.max_side,
         lambda frame: None if report is None else report(frame + 1, last + 1),
@@ -129,11 +134,15 @@ class _Gathered:
         self.rows: list[tuple[int, float, DetectedFace]] = []
         self.left_out: dict[str, str] = {}
         self.notes: list[str] = []
+        self.told: list[tuple[str, str]] = []
+        self.quarters = 0
 
     def read_video(self, detector: LandmarkDetector, report: Report | None) -> None:
         """Every frame, looked at once."""
         self.is_video = True
         video = Video(self.source)
+        turn_upright(video, detector)
+        self.quarters = video.quarters
         total = video.facts().frames
         with frames_ahead(video, max_side=self.max_side) as pictures:
             for picture in pictures:
@@ -168,13 +177,13 @@ class _Gathered:
         self, name: str, number: int, path: Path, detector: LandmarkDetector, face: int | None
     ) -> None:
         photo = load_photo(path, max_side=self.max_side)
-        self.notes += [f"{name}: {note}" for note in photo.notes]
+        self.told += [(name, note) for note in photo.notes]
         try:
             landmarks = detector.detect(photo, face=face)
         except EstimationError as error:
             self.left_out[name] = str(error).removeprefix(f"{photo.name}: ")
             return
-        self.notes += [f"{name}: {note}" for note in landmarks.notes]
+        self.told += [(name, note) for note in landmarks.notes]
         self.files.append(path)
         self._add(name, number, photo.pixels, _as_detected(landmarks))
 
@@ -207,7 +216,8 @@ class _Gathered:
             np.array(self.seconds) if self.is_video else None,
             self.max_side,
             self.left_out,
-            tuple(self.notes),
+            (*self.notes, *gathered_notes(self.told)),
+            self.quarters,
         )
 
 

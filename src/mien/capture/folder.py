@@ -6,7 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mien.capture.files import listed
+from mien.capture.images import is_image
+from mien.capture.made_folders import made_by_mien
+from mien.capture.other_kinds import counted, is_unread
 from mien.capture.photos import PHOTO_SUFFIXES
+from mien.capture.source_kind import VIDEO_SUFFIXES, kind_of_source
 from mien.errors import InputError
 
 NEUTRAL = "neutral"
@@ -16,18 +20,20 @@ _DOCUMENTS = frozenset({"COPYING", "CREDITS", "LICENCE", "LICENSE", "NOTICE", "R
 
 
 def photo_files(source: Path) -> dict[str, list[Path]]:
-    """Photos by expression, `neutral` first, each in natural order."""
-    if source.is_file():
+    """Photos by expression, `neutral` first, each in natural order.
+
+    Raises: InputError: as kind_of_source; a folder without photos: says what is there instead.
+    """
+    if kind_of_source(source) != "folder":
         return {NEUTRAL: [source]}
-    if not source.is_dir():
-        raise InputError(source, "a photo, a video or a folder of photos", "nothing there")
     photos = _photos_in(source)
     if photos:
         return {NEUTRAL: photos}
     folders = {_expression(folder): _photos_in(folder) for folder in _subfolders(source)}
     folders = {name: paths for name, paths in folders.items() if paths}
     if not folders:
-        raise InputError(source, "photos in this folder or in folders within", "none")
+        expected = "photos in this folder or in folders within (JPEG, PNG, TIFF, WebP, HEIC, ...)"
+        raise InputError(source, expected, "; ".join(_instead(source)) or "none")
     return dict(sorted(folders.items(), key=lambda item: item[0] != NEUTRAL))
 
 
@@ -37,19 +43,21 @@ def _expression(folder: Path) -> str:
 
 
 def ignored_files(source: Path) -> list[str]:
-    """A note on files and folders that hold no photos; hidden ones need none."""
+    """Notes on files and folders that are not used as photos; hidden ones need none."""
     if not source.is_dir():
         return []
     flat = bool(_photos_in(source))
     folders = [source] if flat else [source, *_subfolders(source)]
-    ignored = [path for folder in folders for path in listed(folder) if _is_stray(path)]
+    there = [path for folder in folders for path in _files_in(folder)]
+    notes = [f"{source.name}: not read: {what}" for what in [*_unread(there), *_made(source)]]
+    ignored = [path for path in there if _is_stray(path)]
     if flat:
         ignored += [folder for folder in _subfolders(source) if _photos_in(folder)]
-    if not ignored:
-        return []
-    shown = ", ".join(str(path.relative_to(source)) for path in ignored[:5])
-    more = ", ..." if len(ignored) > 5 else ""
-    return [f"not used, as they are no photos or lie beside photos: {shown}{more}"]
+    if ignored:
+        shown = ", ".join(str(path.relative_to(source)) for path in ignored[:5])
+        more = ", ..." if len(ignored) > 5 else ""
+        notes.append(f"not used, as they are no photos or lie beside photos: {shown}{more}")
+    return notes
 
 
 def orphaned_annotations(photos: Sequence[Path]) -> list[str]:
@@ -65,17 +73,67 @@ def orphaned_annotations(photos: Sequence[Path]) -> list[str]:
     ]
 
 
+def _instead(source: Path) -> list[str]:
+    """What lies in a folder without photos, in it or one level down."""
+    folders = _subfolders(source)
+    there = [path for folder in (source, *folders) for path in _files_in(folder)]
+    found = [*_unread(there), *_made(source)]
+    deeper = [within for folder in folders for within in _subfolders(folder) if _photos_in(within)]
+    if deeper:
+        within = deeper[0].relative_to(source)
+        found.append(f"photos one level deeper, as in {within}: give the folder {within.parent}")
+    strays = [path for path in there if _is_stray(path)]
+    if strays:
+        count = f"{len(strays)} other file{'s' * (len(strays) > 1)}"
+        found.append(f"{count}, as {strays[0].relative_to(source)}")
+    return found
+
+
+def _unread(there: Sequence[Path]) -> list[str]:
+    """Of these files the pictures and clips that are not read, by kind."""
+    clips = [path for path in there if _is_clip(path)]
+    found = counted(path for path in there if is_unread(path))
+    if clips:
+        count = f"{len(clips)} video{'s' * (len(clips) > 1)}"
+        found.append(f"{count}, as {clips[0].name} (give a video itself as the source)")
+    return found
+
+
+def _made(source: Path) -> list[str]:
+    made = [(folder.name, made_by_mien(folder)) for folder in _folders_in(source)]
+    return [f"{name}, {kind} that mien made" for name, kind in made if kind]
+
+
 def _photos_in(folder: Path) -> list[Path]:
-    return [path for path in listed(folder) if path.is_file() and _is_photo(path)]
+    return [path for path in _files_in(folder) if _is_photo(path)]
+
+
+def _files_in(folder: Path) -> list[Path]:
+    """Pipes and devices, too, so that one with a photo's name is refused by it."""
+    return [path for path in listed(folder) if not path.is_dir()]
 
 
 def _subfolders(folder: Path) -> list[Path]:
-    return [path for path in listed(folder) if path.is_dir() and path.name != ANNOTATIONS]
+    """Those that may hold photos."""
+    folders = _folders_in(folder)
+    return [path for path in folders if path.name != ANNOTATIONS and not made_by_mien(path)]
+
+
+def _folders_in(folder: Path) -> list[Path]:
+    return [path for path in listed(folder) if path.is_dir()]
 
 
 def _is_stray(path: Path) -> bool:
-    return path.is_file() and not _is_photo(path) and path.stem.upper() not in _DOCUMENTS
+    known = _is_photo(path) or _is_clip(path) or is_unread(path)
+    return not known and path.stem.upper() not in _DOCUMENTS
+
+
+def _is_clip(path: Path) -> bool:
+    return path.suffix.lower() in VIDEO_SUFFIXES
 
 
 def _is_photo(path: Path) -> bool:
+    """By its ending; what has none is looked into."""
+    if not path.suffix:
+        return path.is_file() and path.name not in _DOCUMENTS and is_image(path)
     return path.suffix.lower() in PHOTO_SUFFIXES

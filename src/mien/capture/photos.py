@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,8 +10,8 @@ import numpy as np
 
 from mien.arrays import Array, UInt8, check_image, check_positive, frozen
 from mien.capture.exif import focal_prior_px, orientation
-from mien.capture.files import check_readable, kind_of, one_line
-from mien.errors import FileFormatError
+from mien.capture.files import named_path
+from mien.capture.images import opened_image
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -22,12 +19,9 @@ if TYPE_CHECKING:
 MAX_SIDE = 4096
 """Longest side, in px, of a photo in memory unless the caller says otherwise."""
 
-MAX_PIXELS = 175_000_000
-"""Larger files are refused before any pixel of theirs is decoded (Pillow's own limit is 179 MP)."""
-
-_JPEG = (".jpg", ".jpeg", ".jpe", ".jfif")
+_JPEG = (".jpg", ".jpeg", ".jpe", ".jfif", ".mpo", ".jp2")
 _HEIF = (".heic", ".heif", ".hif", ".avif")
-PHOTO_SUFFIXES = frozenset((*_JPEG, *_HEIF, ".png", ".tif", ".tiff", ".webp", ".bmp"))
+PHOTO_SUFFIXES = frozenset((*_JPEG, *_HEIF, ".png", ".tif", ".tiff", ".webp", ".bmp", ".gif"))
 """Endings (lower case) by which a folder's photos are told from its other files."""
 
 
@@ -80,21 +74,23 @@ def load_photo(path: str | Path, *, max_side: int = MAX_SIDE) -> Photo:
     size, so that photos of 100 megapixels need no more memory than their own bytes.
 
     Args:
-        path: JPEG, PNG, TIFF, WebP, BMP, HEIC, AVIF or whatever else Pillow can read.
+        path: JPEG, PNG, TIFF, WebP, BMP, HEIC, AVIF, GIF, JPEG 2000 or PPM, whatever its name.
         max_side: limit in px on the longer side.
     Raises:
         InputError: there is no such file, it may not be read, `max_side` is not positive.
         FileFormatError: not an image, empty, damaged, too large, of an unsupported sample type.
     """
-    path = Path(path)
+    path = named_path("photo", path, "a photo")
     check_positive("max_side", max_side)
     notes: list[str] = []
-    with _opened(path, notes) as image:
+    with opened_image(path, notes) as image:
         original = image.size
-        turn = orientation(image)
         focal_per_px, focal_note = focal_prior_px(image)
         notes += focal_note
-        upright = _turned(_shrunk_rgb(image, max_side, notes), turn)
+        small = _shrunk_rgb(image, max_side, notes)
+        # Asked for once the pixels are there: some decoders turn them, and say so only then.
+        turn = orientation(image)
+        upright = _turned(small, turn)
         pixels = np.asarray(upright)
     if turn in (5, 6, 7, 8):
         original = original[::-1]
@@ -116,48 +112,6 @@ def shrunk(pixels: UInt8[Array, "h w 3"], side: int) -> UInt8[Array, "h w 3"]:
     size = max(1, round(width * factor)), max(1, round(height * factor))
     small: Array = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
     return small
-
-
-@contextmanager
-def _opened(path: Path, notes: list[str]) -> Iterator[Image]:
-    """The file as a Pillow image; whatever goes wrong while it is open becomes one clear line."""
-    from PIL import Image, UnidentifiedImageError
-
-    check_readable(path, "a photo")
-    _register_heif()
-    with warnings.catch_warnings(record=True) as caught:
-        # Pillow warns about damaged metadata and large pictures; the first is worth a note.
-        warnings.simplefilter("always")
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-        try:
-            with Image.open(path) as image:
-                if image.width * image.height > MAX_PIXELS:
-                    raise _too_large(path, f"{image.width}x{image.height}")
-                yield image
-        except FileFormatError:
-            raise
-        except Image.DecompressionBombError:
-            raise _too_large(path, "more") from None
-        except UnidentifiedImageError:
-            problem = f"expected an image (JPEG, PNG, HEIC, ...), found {kind_of(path)}"
-            raise FileFormatError(path, problem) from None
-        except Exception as error:
-            # Decoders raise whatever a damaged byte leads them to.
-            problem = f"expected a whole image, found a damaged one ({one_line(error)})"
-            raise FileFormatError(path, problem) from error
-    notes += [f"odd file: {one_line(warning.message)}" for warning in caught]
-
-
-def _too_large(path: Path, found: str) -> FileFormatError:
-    limit = f"{MAX_PIXELS // 1_000_000} megapixels"
-    return FileFormatError(path, f"expected at most {limit}, found {found}")
-
-
-def _register_heif() -> None:
-    """Teach Pillow HEIC; doing it twice is harmless."""
-    import pillow_heif
-
-    pillow_heif.register_heif_opener()
 
 
 def _shrunk_rgb(image: Image, max_side: int, notes: list[str]) -> Image:

@@ -17,6 +17,7 @@ from mien.capture.frame_photos import fetch_frames
 from mien.capture.mediapipe_face import DetectedFace
 from mien.capture.photos import MAX_SIDE, Photo, shrunk
 from mien.capture.sharpness import face_sharpness
+from mien.capture.upright import turn_upright
 from mien.capture.video import Video
 from mien.errors import EstimationError
 
@@ -65,6 +66,7 @@ def pick_frames(
     """
     check_positive("count", count)
     video = Video(Path(path))
+    turn_upright(video, detector)
     report = _two_passes(progress, video.facts().frames)
     scores = _judge(video, detector, report)
     rows = _choose_rows(scores, count, expressions)

@@ -20,9 +20,10 @@ from mien.capture.folder import (
 )
 from mien.capture.landmarks import Landmarks
 from mien.capture.mediapipe_face import yaw_pitch
+from mien.capture.notes import gathered_notes
 from mien.capture.photos import MAX_SIDE, Photo, load_photo
 from mien.capture.picked_frames import pick_frames
-from mien.capture.video import VIDEO_SUFFIXES
+from mien.capture.source_kind import kind_of_source
 from mien.errors import EstimationError
 
 Progress = Callable[[int, int], None]
@@ -105,20 +106,20 @@ def load_capture(
         FileFormatError: a photo, a video or an annotation file is damaged.
         EstimationError: no photo shows a face.
     """
-    source = Path(source)
+    kind, source = kind_of_source(source), Path(source)
     with LandmarkDetector() as detector:
         reader = _Reader(detector, max_side, face, names, progress)
-        if source.is_file() and source.suffix.lower() in VIDEO_SUFFIXES:
+        if kind == "video":
             found = reader.from_video(source, frames, expressions)
         else:
             found = reader.from_photos(source)
     found = {name: views for name, views in found.items() if views}
     if not found:
-        reasons = [note for note in reader.notes if "left out" in note]
+        reasons = [f"{photo}: {note}" for photo, note in reader.told if "left out" in note]
         raise EstimationError(
             f"{source}: no photo shows a face that can be used ({'; '.join(reasons[:3])})"
         )
-    notes = (*reader.notes, *_viewpoint_notes(found))
+    notes = (*reader.notes, *gathered_notes(reader.told), *_viewpoint_notes(found))
     name = source.stem if source.is_file() else source.resolve().name
     return Capture(name, found, notes)
 
@@ -137,6 +138,7 @@ class _Reader:
         self.detector, self.max_side, self.face = detector, max_side, face
         self.names, self.progress = names, progress
         self.notes: list[str] = []
+        self.told: list[tuple[str, str]] = []
 
     def from_photos(self, source: Path) -> dict[str, tuple[View, ...]]:
         """Every photo of every expression, each with the annotations beside it."""
@@ -200,13 +202,13 @@ class _Reader:
                 views.append(view)
             else:
                 notes.append(f"left out: the same photo as {twin.photo.name}")
-        self.notes += [f"{photo.name}: {note}" for note in notes]
+        self.told += [(photo.name, note) for note in notes]
 
     def _settled(self, views: list[View]) -> tuple[View, ...]:
         """Photos without a face stay if any other photo of the expression has one."""
         anchored = any(view.marked for view in views)
         what = TO_BE_PLACED if anchored else f"left out: {NO_FACE}"
-        self.notes += [f"{view.photo.name}: {what}" for view in views if not view.marked]
+        self.told += [(view.photo.name, what) for view in views if not view.marked]
         return tuple(views) if anchored else ()
 
     def _annotations_of(self, path: Path, photo: Photo) -> Annotations | None:

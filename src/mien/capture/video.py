@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mien.arrays import Array, UInt8
+from mien.capture.display import Display, display_of
 from mien.capture.files import check_readable, kind_of, one_line
-from mien.capture.photos import MAX_PIXELS
+from mien.capture.hdr import HDR, to_srgb
+from mien.capture.images import MAX_PIXELS
 from mien.errors import FileFormatError
 
 if TYPE_CHECKING:
@@ -20,11 +22,38 @@ if TYPE_CHECKING:
     from av.container import InputContainer
     from av.video.stream import VideoStream
 
-VIDEO_SUFFIXES = frozenset((".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mts", ".3gp"))
+CONTAINERS = (
+    "mov",
+    "matroska",
+    "webm",
+    "avi",
+    "mpegts",
+    "mpeg",
+    "mpegvideo",
+    "asf",
+    "flv",
+    "ogg",
+    "mxf",
+    "dv",
+    "rm",
+    "ivf",
+    "h264",
+    "hevc",
+    "gif",
+    "apng",
+    # Of these it can be said that they hold no pictures.
+    "wav",
+    "mp3",
+    "aac",
+    "flac",
+)
+"""FFmpeg's names of what is read. It knows others, which are lists of files or addresses that it
+would open, or single pictures."""
 
+_OPTIONS = {"format_whitelist": ",".join(CONTAINERS), "protocol_whitelist": "file"}
 _USUAL_RATE = 25
+_UNSPECIFIED, _BT2020 = 2, 9  # Codes of matrix coefficients
 _PER_SECOND = 1e6  # FFmpeg's unit of a container's times
-_PQ, _HLG = 16, 18
 
 
 @dataclass(frozen=True)
@@ -36,27 +65,28 @@ class Frame:
         seconds: since the clip's beginning.
         stored_size: width and height of the clip's pictures before they are turned upright, px,
             their pixels made square.
+        display: how they are turned.
         raw: as the decoder gave it; of another size where a clip changes it on its way.
     """
 
     index: int
     seconds: float
     stored_size: tuple[int, int]
+    display: Display
     raw: VideoFrame
 
     @property
-    def hdr(self) -> bool:
-        """Coded for a brighter range than sRGB's, which shifts its colours here."""
-        return self.raw.color_trc in (_PQ, _HLG)
+    def hdr(self) -> str:
+        """ "HLG" or "PQ", if it is coded so for a brighter range than sRGB's; else ""."""
+        return HDR.get(self.raw.color_trc, "")
 
     @property
     def size(self) -> tuple[int, int]:
         """Width and height of its pixels, px."""
-        width, height = self.stored_size
-        return (height, width) if self._quarters % 2 else (width, height)
+        return self.display.size(*self.stored_size)
 
     def pixels(self, *, max_side: int | None = None) -> UInt8[Array, "h w 3"]:
-        """(H, W, 3) sRGB with square pixels, the container's rotation flag applied.
+        """(H, W, 3) sRGB with square pixels, as players show it: turned, mirrored, HDR mapped.
 
         Args:
             max_side: px; a picture whose longer side is longer is reduced to it by averaging while
@@ -66,13 +96,20 @@ class Frame:
         width, height = (max(1, round(side * factor)) for side in self.stored_size)
         # The scaler's quickest way, "FAST_BILINEAR", shifts pictures by most of a pixel.
         how = "AREA" if height < self.raw.height else "BILINEAR"
-        stored = self.raw.to_ndarray(format="rgb24", width=width, height=height, interpolation=how)
-        return np.ascontiguousarray(np.rot90(stored, self._quarters))
-
-    @property
-    def _quarters(self) -> int:
-        """Turns to make it upright, counterclockwise as the flag and numpy count."""
-        return round(self.raw.rotation / 90)
+        if self.hdr:
+            codes = self.raw.to_ndarray(
+                format="rgb48le",
+                width=width,
+                height=height,
+                interpolation=how,
+                src_colorspace=_hdr_matrix(self.raw.colorspace),
+            )
+            stored = to_srgb(codes, self.raw.color_trc, self.raw.color_primaries)
+        else:
+            stored = self.raw.to_ndarray(
+                format="rgb24", width=width, height=height, interpolation=how
+            )
+        return self.display.show(stored)
 
 
 @dataclass(frozen=True)
@@ -99,10 +136,12 @@ class Video:
 
     Attributes:
         path: the file.
+        quarters: turns counterclockwise of every picture, beyond what the file says.
         notes: grows while frames are read: a stream that breaks, frames that cannot be decoded.
     """
 
     path: Path
+    quarters: int = 0
     notes: list[str] = field(default_factory=list)
 
     def frames(self) -> Generator[Frame]:
@@ -116,9 +155,9 @@ class Video:
         with self._opened() as container:
             stream = self._stream(container)
             try:
-                for frame in _decoded(container, stream):
+                for frame in _decoded(container, stream, self.quarters):
                     if frame.hdr:
-                        self._note("HDR video: its colours are approximate")
+                        self._note(f"HDR video ({frame.hdr}): its colours are mapped to sRGB")
                     yield frame
                     count += 1
             except av.FFmpegError as error:
@@ -145,19 +184,13 @@ class Video:
             self.notes.append(note)
 
     def _opened(self) -> InputContainer:
-        import av
-
         check_readable(self.path, "a video")
-        try:
-            return av.open(str(self.path), metadata_errors="replace")
-        except av.FFmpegError as error:
-            found = f"{kind_of(self.path)} ({one_line(error.strerror or error)})"
-            raise FileFormatError(self.path, f"expected a video, found {found}") from None
+        return _open(self.path)
 
     def _stream(self, container: InputContainer) -> VideoStream:
-        if not container.streams.video:
+        stream = _pictures(container)
+        if stream is None:
             raise FileFormatError(self.path, "expected a video, found no picture track in it")
-        stream = container.streams.video[0]
         stream.thread_type = "AUTO"
         if stream.width * stream.height > MAX_PIXELS:
             found = f"{stream.width}x{stream.height}"
@@ -166,15 +199,53 @@ class Video:
         return stream
 
 
-def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[Frame]:
+def is_video(path: Path) -> bool:
+    """Whether the file begins like a video, whatever its name."""
+    try:
+        with _open(path) as container:
+            return _pictures(container) is not None
+    except FileFormatError:
+        return False
+
+
+def _open(path: Path) -> InputContainer:
+    import av
+
+    # Up to PyAV 18 text that is not UTF-8 fails unless told not to.
+    lenient = {"metadata_errors": "replace"} if int(av.__version__.split(".")[0]) < 19 else {}
+    try:
+        # Without "file:" a name like "concat:a" would be an address.
+        return av.open(f"file:{path}", container_options=_OPTIONS, **lenient)  # type: ignore[call-overload,no-any-return]
+    except av.FFmpegError as error:
+        found = f"{kind_of(path)} ({one_line(error.strerror or error)})"
+        raise FileFormatError(path, f"expected a video, found {found}") from None
+
+
+def _pictures(container: InputContainer) -> VideoStream | None:
+    """The first track of pictures that is not the cover of a piece of music."""
+    from av.stream import Disposition
+
+    streams = container.streams.video
+    return next((s for s in streams if not s.disposition & Disposition.attached_pic), None)
+
+
+def _decoded(container: InputContainer, stream: VideoStream, quarters: int) -> Iterator[Frame]:
     """Raises: av.FFmpegError: where the stream breaks."""
     begin = (container.start_time or 0) / _PER_SECOND
     aspect = float(stream.sample_aspect_ratio or 1)
     size: tuple[int, int] | None = None
+    display = Display()
     for count, raw in enumerate(container.decode(stream)):
-        size = size or (max(1, round(raw.width * aspect)), raw.height)
+        if size is None:
+            size = max(1, round(raw.width * aspect)), raw.height
+            display = display_of(raw).turned(quarters)
         seconds = count / _rate(stream) if raw.time is None else raw.time - begin
-        yield Frame(count, seconds, size, raw)
+        yield Frame(count, seconds, size, display, raw)
+
+
+def _hdr_matrix(colorspace: int) -> int:
+    """What HDR pictures are coded with where the file does not say."""
+    return _BT2020 if colorspace == _UNSPECIFIED else colorspace
 
 
 def _rate(stream: VideoStream) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.assets.subregions import Subregions, default_subregions
+from mien.capture.files import named_path
 from mien.errors import Broken, EstimationError, FileFormatError, InputError
 from mien.formats.atomic import atomic_folder, check_folder_place
 from mien.formats.example_json import (
@@ -113,7 +114,8 @@ def load_examples(folder: str | Path, *, layout: FeatureLayout | None = None) ->
     Raises: InputError: no such folder. FileFormatError: something in it is missing, damaged, of
         another layout or newer than this program; the message names the file and the place in it.
     """
-    folder, layout = Path(folder), layout or load_feature_layout()
+    folder = named_path("examples", folder, "an example folder that `mien examples` made")
+    layout = layout or load_feature_layout()
     path, data = _read_index(folder)
     try:
         examples = _from_json(folder, data, layout)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mien.arrays import Array, UInt8
+from mien.capture.files import named_path
 from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_folder, check_folder_place
 from mien.formats.head_geometry import check_names, read_geometry
@@ -111,7 +112,7 @@ def load_head(folder: str | Path) -> Head:
     Raises: InputError: no such folder. FileFormatError: something in it is missing, damaged or
         newer than this program; the message names the file and the place in it.
     """
-    folder = Path(folder)
+    folder = named_path("head", folder, "a head folder that `mien build` made")
     put_back(folder)
     if not folder.is_dir():
         raise InputError(folder, "a head folder that `mien build` made", _what_is(folder))

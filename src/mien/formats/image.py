@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from mien.arrays import Array, UInt8
+from mien.capture.colour import to_eight_bits
+from mien.capture.images import opened_image
 from mien.errors import FileFormatError, InputError
 from mien.formats.atomic import atomic_file
 
@@ -79,16 +81,19 @@ def is_drawn_png(path: Path) -> bool:
 
 
 def load_image(path: str | Path) -> UInt8[Array, "h w 3"]:
-    """An image that mien wrote, as (h, w, 3) sRGB. Raises: FileFormatError: missing, not readable.
+    """An image that mien wrote, or that was painted in place of one, as (h, w, 3) sRGB.
 
     Photos of unknown making are read by `mien.capture` instead.
-    """
-    from PIL import Image, UnidentifiedImageError
 
+    Raises: FileFormatError: missing, not a file, not such an image.
+    """
     try:
-        with Image.open(path) as image:
-            return np.asarray(image.convert("RGB"))
-    except FileNotFoundError:
-        raise FileFormatError(path, "there is no such file") from None
-    except (UnidentifiedImageError, OSError, SyntaxError, Image.DecompressionBombError) as error:
-        raise FileFormatError(path, f"not a readable image ({error})") from error
+        with opened_image(path, [], kind="an image") as image:
+            image.load()
+            # Pillow's own conversion of 16 bits cuts them off at 255.
+            eight_bits = to_eight_bits(image, []) if image.mode.startswith("I") else image
+            return np.asarray(eight_bits.convert("RGB"))
+    except InputError as error:
+        missing = not Path(path).exists()
+        found = f"expected {error.expected}, found {error.got}"
+        raise FileFormatError(path, "there is no such file" if missing else found) from None

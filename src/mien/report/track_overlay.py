@@ -34,7 +34,7 @@ _LONGEST_SECONDS = 10.0
 
 def write_overlay(
     path: str | Path,
-    video: str | Path,
+    video: str | Path | Video,
     track: Track,
     head: Head | HeadRenderer,
     *,
@@ -90,7 +90,7 @@ def overlay_frames(
 
 
 def decoded(
-    path: str | Path, track: Track
+    video: str | Path | Video, track: Track
 ) -> Generator[tuple[UInt8[Array, "h w 3"], TrackedFrame]]:
     """The frames of a video that a track is of, with what was found in them.
 
@@ -98,15 +98,16 @@ def decoded(
     """
     by_number = {found.frame: found for found in track.frames}
     last = max(by_number, default=-1)
-    with closing(Video(Path(path)).frames()) as frames:
+    clip = video if isinstance(video, Video) else Video(Path(video))
+    with closing(clip.frames()) as frames:
         for frame in frames:
             if frame.index in by_number:
-                yield _pixels(frame, path, track), by_number[frame.index]
+                yield _pixels(frame, clip.path, track), by_number[frame.index]
             if frame.index >= last:
                 return
 
 
-def _pixels(frame: Frame, path: str | Path, track: Track) -> UInt8[Array, "h w 3"]:
+def _pixels(frame: Frame, path: Path, track: Track) -> UInt8[Array, "h w 3"]:
     pixels = frame.pixels()
     if pixels.shape[:2] != (track.height, track.width):
         expected = f"{track.width}x{track.height} px as the track's video"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from mien.arrays import Array, Float
+from mien.capture.video import Video
 from mien.errors import InputError
 from mien.formats.atomic import atomic_file, check_file_place
 from mien.formats.image import save_image
@@ -38,7 +39,7 @@ def write_track_plots(
     *,
     reference: Track | None = None,
     title: str = "Track",
-    video: str | Path | None = None,
+    video: str | Path | Video | None = None,
     head: Head | HeadRenderer | None = None,
     kind: str = "png",
     progress: Callable[[int, int], None] = lambda done, total: None,
@@ -87,7 +88,7 @@ def _write_each(
     track: Track,
     reference: Track | None,
     title: str,
-    sheet: tuple[()] | tuple[str | Path, Head | HeadRenderer],
+    sheet: tuple[()] | tuple[str | Path | Video, Head | HeadRenderer],
     plots: list[Plot],
     kind: str,
 ) -> Iterator[Path]:
@@ -112,7 +113,9 @@ def _write_each(
     yield folder / PAGE
 
 
-def _write_sheet(path: Path, track: Track, video: str | Path, head: Head | HeadRenderer) -> Path:
+def _write_sheet(
+    path: Path, track: Track, video: str | Path | Video, head: Head | HeadRenderer
+) -> Path:
     chosen = evenly_chosen(track, _SHEET_FRAMES)
     save_image(path, contact_sheet(decoded(video, chosen), track, head), quality=90)
     return path

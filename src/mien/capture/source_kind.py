@@ -1,0 +1,51 @@
+"""What a user's source is: told by its bytes, not by its name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from mien.capture.files import check_readable, kind_of, named_path
+from mien.capture.images import is_image
+from mien.capture.made_folders import made_by_mien
+from mien.capture.other_kinds import unread_kind
+from mien.capture.photos import PHOTO_SUFFIXES
+from mien.capture.video import is_video
+from mien.errors import FileFormatError, InputError
+
+EXPECTED = "a photo, a video or a folder of photos"
+_VIDEO_SUFFIXES = (
+    ".3g2 .3gp .apng .asf .avi .divx .dv .f4v .flv .m1v .m2ts .m2v .m4v .mkv .mod .mov .mp4 .mpe "
+    ".mpeg .mpg .mts .mxf .ogm .ogv .qt .rm .tod .ts .vob .webm .wmv"
+)
+VIDEO_SUFFIXES = frozenset(_VIDEO_SUFFIXES.split())
+"""Endings (lower case) of what is meant as a video, where its bytes do not tell."""
+
+SourceKind = Literal["folder", "photo", "video"]
+
+
+def kind_of_source(source: str | Path) -> SourceKind:
+    """What every command that takes photos or a video makes of a source.
+
+    A picture that moves (a GIF, an animated PNG) is a video. What cannot be told is what its name
+    says: whoever reads it will say what is wrong with it.
+
+    Raises: InputError: nothing given, nothing there, a folder that mien made, a pipe, a device.
+        FileFormatError: an empty file, one that is neither a photo nor a video.
+    """
+    path = named_path("source", source, EXPECTED)
+    if path.is_dir():
+        if made := made_by_mien(path):
+            raise InputError(source, "photos or a video", f"{made} that mien made of them")
+        return "folder"
+    if not path.exists():
+        raise InputError(source, EXPECTED, "nothing there")
+    check_readable(path, "a photo or a video")
+    if is_image(path):
+        return "photo"
+    unread, suffix = unread_kind(path), path.suffix.lower()
+    if not unread and (is_video(path) or suffix in VIDEO_SUFFIXES):
+        return "video"
+    if suffix in PHOTO_SUFFIXES:
+        return "photo"
+    raise FileFormatError(path, f"expected a photo or a video, found {unread or kind_of(path)}")
