@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8
-from mien.capture.detector import LandmarkDetector, look_twice
+from mien.capture.detector import LandmarkDetector, closer
 from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
 from mien.capture.frame_choice import FrameScores
 from mien.capture.frame_photos import fetch_frames, frame_name
@@ -137,10 +137,11 @@ class _Gathered:
         total = video.facts().frames
         with frames_ahead(video, max_side=self.max_side) as pictures:
             for picture in pictures:
-                found = look_twice(detector, picture.pixels)
-                if found is None:
+                faces = detector.all_fast(picture.pixels)
+                if not faces:
                     self.left_out[frame_name(picture.frame)] = "no face found"
                 else:
+                    found = closer(detector, picture.pixels, faces[0])
                     self.seconds.append(picture.seconds)
                     self._add(frame_name(picture.frame), picture.frame, picture.pixels, found)
                 if report is not None:

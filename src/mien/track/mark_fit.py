@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mien.arrays import Array, Float, Int
+from mien.capture.landmarks import inside_picture
 from mien.capture.mediapipe_face import BLENDSHAPE_NAMES, DetectedFace
 from mien.model.dense.projection import UNKNOWNS, Pinholes, project_places
 from mien.numeric.lm import minimize_lm
@@ -84,6 +85,7 @@ class Observation:
     def of(marks: Marks, face: DetectedFace, size: tuple[int, int]) -> Observation:
         """Of a face that was found in a picture of this width and height."""
         trust = facing_share(-(marks.normals @ face.R_cam_head.T)[:, 2])
+        trust = trust * inside_picture(face.points[:, :2], size)
         kept = np.flatnonzero(np.isfinite(marks.sigma_mm) & (trust > 0))
         return Observation(
             places=marks.places[kept],

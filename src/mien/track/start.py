@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
-from mien.capture.detector import LandmarkDetector, look_twice
+from mien.capture.detector import LandmarkDetector, closer
 from mien.capture.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace
 from mien.errors import EstimationError
 from mien.expressions.followers import part_vertices
@@ -61,7 +63,12 @@ class Starter:
 
     def look(self, pixels: UInt8[Array, "h w 3"]) -> DetectedFace | None:
         """The largest face; one that is small is looked at twice."""
-        return look_twice(self._detector, pixels)
+        return next(self.looks(pixels), None)
+
+    def looks(self, pixels: UInt8[Array, "h w 3"]) -> Iterator[DetectedFace]:
+        """Every face, the largest first; those that are small are looked at twice."""
+        for face in self._detector.all_fast(pixels):
+            yield closer(self._detector, pixels, face)
 
     def fit(
         self, face: DetectedFace, *, size: tuple[int, int], focal_px: float
