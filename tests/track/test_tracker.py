@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 
 import numpy as np
@@ -14,7 +14,7 @@ from mien.arrays import Array
 from mien.errors import InputError
 from mien.numeric.rotation import angle_between
 from mien.track.guess import Guess
-from mien.track.start import Starter
+from mien.track.start import Found, Starter
 from mien.track.state import TrackedFrame, TrackState
 from mien.track.tracker import Tracker, TrackOptions
 
@@ -45,13 +45,12 @@ class Told:
         self.number: int | None = 0
         self.asked = 0
 
-    def find(self, *_: object, **__: object) -> TrackState | None:
+    def find(self, *_: object, **__: object) -> Iterator[Found]:
         self.asked += 1
-        if self.number is None:
-            return None
-        off = np.zeros(17)
-        off[:6] = (0.015, -0.015, 0.01, 3, -2, 8)
-        return state_of(truth(self.number).moved(off))
+        if self.number is not None:
+            off = np.zeros(17)
+            off[:6] = (0.015, -0.015, 0.01, 3, -2, 8)
+            yield Found(state_of(truth(self.number).moved(off)), 1.0)
 
 
 @pytest.fixture

@@ -15,7 +15,6 @@ from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
 from mien.capture.frame_choice import FrameScores
 from mien.capture.frame_photos import fetch_frames, frame_name
 from mien.capture.frames_ahead import frames_ahead
-from mien.capture.landmarks import Landmarks
 from mien.capture.mediapipe_face import DetectedFace
 from mien.capture.photos import Photo, load_photo
 from mien.capture.sharpness import face_sharpness
@@ -177,7 +176,7 @@ class _Gathered:
             return
         self.notes += [f"{name}: {note}" for note in landmarks.notes]
         self.files.append(path)
-        self._add(name, number, photo.pixels, _as_detected(landmarks))
+        self._add(name, number, photo.pixels, landmarks.as_face())
 
     def _add(
         self, name: str, number: int, pixels: UInt8[Array, "h w 3"], found: DetectedFace
@@ -210,12 +209,6 @@ class _Gathered:
             self.left_out,
             tuple(self.notes),
         )
-
-
-def _as_detected(landmarks: Landmarks) -> DetectedFace:
-    """What a closer look at a photo found, as a look at a frame gives it."""
-    points = np.column_stack([landmarks.points, np.zeros(len(landmarks.points))])
-    return DetectedFace(points, landmarks.blendshapes, landmarks.R_cam_head)
 
 
 def row_of(series: FaceSeries, what: str, option: str) -> int:

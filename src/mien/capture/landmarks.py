@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int, check_array, check_rotation, frozen
-from mien.capture.mediapipe_face import LANDMARK_COUNT, LEFT_IRIS, RIGHT_IRIS
+from mien.capture.mediapipe_face import LANDMARK_COUNT, LEFT_IRIS, RIGHT_IRIS, DetectedFace
 
 CUT_SHARE = 0.02
 """Of the face's width: how far over the edge of the picture a point may lie before the edge is said
@@ -44,6 +44,11 @@ class Landmarks:
         object.__setattr__(
             self, "R_cam_head", frozen(check_rotation("R_cam_head", self.R_cam_head))
         )
+
+    def as_face(self) -> DetectedFace:
+        """As a look at a frame gives it; of depth nothing is known."""
+        points = np.column_stack([self.points, np.zeros(LANDMARK_COUNT)])
+        return DetectedFace(points, self.blendshapes, self.R_cam_head)
 
     @property
     def eye_distance_px(self) -> float:

@@ -114,6 +114,12 @@ class Observation:
         errors = shown.points[self.kept, :2] - wanted
         return replace(self, image_points=self.image_points - errors)
 
+    def misfit_mm(self, guess: Guess, focal_px: float) -> float:
+        """How far off the landmarks are from where they lie on a head, RMS."""
+        x, y, z = (self.on(guess) @ guess.R.T + guess.t).T
+        off = np.stack([x, y]) * focal_px / z - self.image_points.T
+        return float(np.sqrt(((off * guess.t[2] / focal_px) ** 2).sum(axis=0).mean()))
+
     def start(self, focal_px: float) -> Guess:
         """The neutral head turned as the detector says, where its landmarks agree best."""
         x, y, z = self.R_cam_head @ self.places.T

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,6 +31,18 @@ _SHUT, _OPEN = 0.25, 0.6
 """Of the neutral gap between the lids: below the first an iris is guessed, from the second seen."""
 
 
+class Found(NamedTuple):
+    """A head in the place of a face.
+
+    Attributes:
+        state: where it is, and what it does.
+        misfit_mm: how far the face's landmarks are off the head's, RMS.
+    """
+
+    state: TrackState
+    misfit_mm: float
+
+
 class Starter:
     """Finds one head in pictures of any size; what they share is prepared once, in a second.
 
@@ -50,36 +63,51 @@ class Starter:
         self.marks = measure_marks(rig, head.mesh, layout, self._pictures)
         self._eyes = _Eyes(head, rig, layout, self.marks.places)
 
-    def find(self, pixels: UInt8[Array, "h w 3"], *, focal_px: float) -> TrackState | None:
-        """The head of the largest face in a picture; None: no face, or none that fits.
+    def find(self, pixels: UInt8[Array, "h w 3"], *, focal_px: float) -> Iterator[Found]:
+        """The head in the place of every face that it fits, the largest face first.
 
         Args:
             focal_px: of the picture as it is given.
         """
-        face = self.look(pixels)
-        if face is None:
-            return None
-        return self.fit(face, size=(pixels.shape[1], pixels.shape[0]), focal_px=focal_px)
+        size = (pixels.shape[1], pixels.shape[0])
+        for face in self.look(pixels):
+            found = self.fit(face, size=size, focal_px=focal_px)
+            if found is not None:
+                yield found
 
-    def look(self, pixels: UInt8[Array, "h w 3"]) -> DetectedFace | None:
-        """The largest face; one that is small is looked at twice."""
-        return next(self.looks(pixels), None)
+    def find_at(
+        self, pixels: UInt8[Array, "h w 3"], t_cam_head: Float[Array, " 3"], *, focal_px: float
+    ) -> TrackState | None:
+        """The head in the face that is where it is expected, whoever else is in the picture.
 
-    def looks(self, pixels: UInt8[Array, "h w 3"]) -> Iterator[DetectedFace]:
+        None where no face is, or none that fits.
+
+        Args:
+            t_cam_head: mm, about where the head is.
+        """
+        size = np.array([pixels.shape[1], pixels.shape[0]])
+        place = focal_px * t_cam_head[:2] / t_cam_head[2] + size / 2
+        for face in sorted(self._detector.all_fast(pixels), key=lambda face: _off(face, place)):
+            if _off(face, place) > face.width:
+                return None
+            face = closer(self._detector, pixels, face)
+            found = self.fit(face, size=(pixels.shape[1], pixels.shape[0]), focal_px=focal_px)
+            return found and found.state
+        return None
+
+    def look(self, pixels: UInt8[Array, "h w 3"]) -> Iterator[DetectedFace]:
         """Every face, the largest first; those that are small are looked at twice."""
         for face in self._detector.all_fast(pixels):
             yield closer(self._detector, pixels, face)
 
-    def fit(
-        self, face: DetectedFace, *, size: tuple[int, int], focal_px: float
-    ) -> TrackState | None:
+    def fit(self, face: DetectedFace, *, size: tuple[int, int], focal_px: float) -> Found | None:
         """The head where a detected face is, in a picture of this width and height."""
         seen = Observation.of(self.marks, face, size)
         try:
             guess = fit_face(seen, self.layout, focal_px, start=seen.start(focal_px))
         except EstimationError:
             return None
-        return self._state(guess, face, size, focal_px)
+        return Found(self._state(guess, face, size, focal_px), seen.misfit_mm(guess, focal_px))
 
     def corrected(
         self, seen: Observation, guess: Guess, size: tuple[int, int], focal_px: float
@@ -110,6 +138,11 @@ class Starter:
         mixed = mixed * np.minimum(1, _MOST_WEIGHT / np.maximum(together, 1e-9))
         weights = np.column_stack([1 - mixed.sum(axis=1), mixed])
         return weights, face[regions * expressions :]
+
+
+def _off(face: DetectedFace, place: Float[Array, " 2"]) -> float:
+    """Px from between a face's eyes."""
+    return float(np.linalg.norm(face.points[_IRISES, :2].mean(axis=0) - place))
 
 
 class _Eyes:
