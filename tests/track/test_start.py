@@ -93,7 +93,7 @@ def test_shut_eyes_look_nowhere() -> None:
 
 def test_no_face_is_no_state() -> None:
     pixels = np.zeros((480, 640, 3), np.uint8)
-    assert not list(starter().find(pixels, focal_px=FOCAL))
+    assert starter().find(pixels, focal_px=FOCAL) == []
     assert starter().find_at(pixels, posed().t_cam_head, focal_px=FOCAL) is None
 
 

@@ -94,9 +94,27 @@ class LandmarkDetector:
         """Every face, the largest first, after a single pass, upright only."""
         return sorted(self._network.faces(pixels), key=lambda found: -found.width)
 
+    def all_in_parts(self, pixels: UInt8[Array, "h w 3"]) -> list[DetectedFace]:
+        """Upright faces too small to be seen in the whole: in nine overlapping halves."""
+        height, width = pixels.shape[:2]
+        faces: list[DetectedFace] = []
+        if min(height, width) < 2:
+            return faces
+        for top in (0, height // 4, height // 2):
+            for left in (0, width // 4, width // 2):
+                part = pixels[top : top + height // 2, left : left + width // 2]
+                small = shrunk(part, _SEARCH_SIDE // 2)
+                factor = part.shape[1] / small.shape[1]
+                for found in self._network.faces(small):
+                    moved = _moved(found, factor, (left, top))
+                    if not any(same_place(moved, other) for other in faces):
+                        faces.append(moved)
+        return faces
+
     def _best_sight(self, photo: Photo, face: int | None) -> _Sight | None:
         """The photo as it stands, in parts, then turned, until a face holds still."""
-        upright = self._look(photo, face) or self._look_in_parts(photo, face)
+        upright = self._look(photo, face)
+        upright = upright or self._refine(photo, self.all_in_parts(photo.pixels), face, 0)
         if upright is not None and upright.steady:
             return upright
         turned: list[_Sight | None] = []
@@ -119,23 +137,6 @@ class LandmarkDetector:
         faces = self._network.faces(small)
         factor = pixels.shape[1] / small.shape[1]
         return self._refine(photo, [_moved(found, factor) for found in faces], face, quarters)
-
-    def _look_in_parts(self, photo: Photo, face: int | None) -> _Sight | None:
-        """A face too small to be seen in the whole: nine overlapping halves."""
-        height, width = photo.pixels.shape[:2]
-        faces: list[DetectedFace] = []
-        if min(height, width) < 2:
-            return None
-        for top in (0, height // 4, height // 2):
-            for left in (0, width // 4, width // 2):
-                part = photo.pixels[top : top + height // 2, left : left + width // 2]
-                small = shrunk(part, _SEARCH_SIDE // 2)
-                factor = part.shape[1] / small.shape[1]
-                for found in self._network.faces(small):
-                    moved = _moved(found, factor, (left, top))
-                    if not any(_same_place(moved, other) for other in faces):
-                        faces.append(moved)
-        return self._refine(photo, faces, face, 0)
 
     def _refine(
         self, photo: Photo, faces: list[DetectedFace], face: int | None, quarters: int
@@ -164,6 +165,21 @@ def closer(
     return _from_near_by(detector, pixels, found) or found
 
 
+def faces_around(
+    detector: LandmarkDetector,
+    pixels: UInt8[Array, "h w 3"],
+    place: tuple[float, float],
+    reach: float,
+) -> list[DetectedFace]:
+    """Upright faces in the square cut-out that reaches so many px to each side of a place."""
+    left, top = (max(int(middle - reach), 0) for middle in place)
+    right, bottom = (max(int(middle + reach), 0) for middle in place)
+    crop = np.ascontiguousarray(pixels[top:bottom, left:right])
+    if min(crop.shape[:2]) < 2:
+        return []
+    return [_moved(face, 1.0, (left, top)) for face in detector.all_fast(crop)]
+
+
 def _from_near_by(
     detector: LandmarkDetector, pixels: Array, found: DetectedFace, side: int | None = None
 ) -> DetectedFace | None:
@@ -173,7 +189,7 @@ def _from_near_by(
     factor = crop.shape[1] / small.shape[1]
     seen = [_moved(face, factor, (left, top)) for face in detector.all_fast(small)]
     # Somebody else may be larger in the cut-out.
-    near = [face for face in seen if _same_place(face, found)]
+    near = [face for face in seen if same_place(face, found)]
     return min(near, key=lambda face: _apart(face, found), default=None)
 
 
@@ -240,7 +256,8 @@ def _choose(faces: list[DetectedFace], face: int | None, name: str) -> tuple[int
     return largest, (note,)
 
 
-def _same_place(one: DetectedFace, other: DetectedFace) -> bool:
+def same_place(one: DetectedFace, other: DetectedFace) -> bool:
+    """Whether two sights are of one face."""
     return _apart(one, other) < max(one.width, other.width) / 2
 
 

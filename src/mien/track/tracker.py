@@ -46,7 +46,8 @@ was in the last frame is another person's, if it is strange, too."""
 _ENOUGH = 5
 """Frames that tell what is usual."""
 _LOOK_AROUND = 10
-"""Every so many frames a strange face is compared with the others in the picture."""
+"""Every so many frames a strange face is compared with others, and faces are sought that are too
+small to be found in the whole picture; that takes the time of ten looks."""
 _USUAL_STEP = 1 / 25
 """Seconds between two frames for which these hold."""
 
@@ -126,15 +127,15 @@ class Tracker:
             frame: its number. time: seconds.
             start: where a face that is found anew is; by default where the detector finds any.
         """
-        camera = self._camera.resized(pixels.shape[1] / self._camera.width)
-        camera = replace(camera, width=pixels.shape[1], height=pixels.shape[0])
+        camera, again = self._camera_of(pixels), frame % _LOOK_AROUND == 0
         status: Status = "ok"
         fitted = self._followed(pixels, camera, time)
         if fitted is None:
             status = "reacquired" if self._past else "ok"
-            fitted = self._found(pixels, camera, start)
-        elif fitted.agreement.rms > STRANGE_RMS and frame % _LOOK_AROUND == 0:
-            other = self._found(pixels, camera)
+            closely = again or not self._past
+            fitted = self._found(pixels, camera, closely=closely, start=start)
+        elif fitted.agreement.rms > STRANGE_RMS and again:
+            other = self._found(pixels, camera, closely=True)
             if other is not None and 2 * other.agreement.rms < fitted.agreement.rms:
                 status, fitted = "reacquired", other
         if fitted is not None:
@@ -143,6 +144,10 @@ class Tracker:
         result = result if fitted is None else replace(result, status=status)
         self._past = [*self._past[-1:], result]
         return result
+
+    def _camera_of(self, pixels: Array) -> Camera:
+        camera = self._camera.resized(pixels.shape[1] / self._camera.width)
+        return replace(camera, width=pixels.shape[1], height=pixels.shape[0])
 
     def _followed(self, pixels: Array, camera: Camera, time: float) -> Fitted | None:
         """From where it was before; None where it is not there."""
@@ -177,16 +182,30 @@ class Tracker:
         taken[solved] = steady_step(step[solved], fitted.information, self._blocks)
         return replace(fitted, guess=start.moved(taken))
 
-    def _found(self, pixels: Array, camera: Camera, start: Found | None = None) -> Fitted | None:
+    def _found(
+        self, pixels: Array, camera: Camera, *, closely: bool, start: Found | None = None
+    ) -> Fitted | None:
         """By the detector, the face most like the head; None where there is none, or another's."""
-        starts = [start] if start else list(self._starter.find(pixels, focal_px=camera.focal_px))
-        fits = [(self._fitted_anew(one.state, pixels, camera), one.misfit_mm) for one in starts]
-        sound = [(fit, misfit) for fit, misfit in fits if _if_like(fit)]
-        best, _ = min(sound, key=lambda pair: _unlike(*pair), default=(None, 0.0))
-        if best is not None and best.agreement.rms > self._most_usual:
-            best = None
+        if start is not None:
+            return self._likest([start], pixels, camera)
+        starts = self._starter.find(pixels, focal_px=camera.focal_px)
+        best = self._likest(starts, pixels, camera)
+        if best is None and closely:
+            small = self._starter.find(pixels, focal_px=camera.focal_px, small=True)
+            best, starts = self._likest(small, pixels, camera), [*starts, *small]
         self.met_others |= bool(starts) and best is None
         return best
+
+    def resembles(self, pixels: UInt8[Array, "h w 3"], found: Found) -> bool:
+        """Whether the head looks like a picture, its own size or smaller, in the place found."""
+        return self._likest([found], pixels, self._camera_of(pixels)) is not None
+
+    def _likest(self, starts: Sequence[Found], pixels: Array, camera: Camera) -> Fitted | None:
+        """From the start that gives the face most like the head; None where none is like it."""
+        fits = [(self._fitted_anew(one.state, pixels, camera), one.misfit_mm) for one in starts]
+        sound = [(fit, _unlike(fit, misfit)) for fit, misfit in fits if _if_like(fit)]
+        best, _ = min(sound, key=lambda pair: pair[1], default=(None, 0.0))
+        return best if best and best.agreement.rms <= self._most_usual else None
 
     @property
     def _most_usual(self) -> float:
