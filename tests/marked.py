@@ -28,8 +28,8 @@ class Blind(LandmarkDetector):
     def __init__(self) -> None:
         pass
 
-    def detect_fast(self, pixels: Array) -> DetectedFace | None:
-        return None
+    def all_fast(self, pixels: Array) -> list[DetectedFace]:
+        return []
 
 
 class Shown(Blind):
@@ -39,9 +39,10 @@ class Shown(Blind):
         self.faces = list(faces)
         self.sizes: list[tuple[int, ...]] = []
 
-    def detect_fast(self, pixels: Array) -> DetectedFace | None:
+    def all_fast(self, pixels: Array) -> list[DetectedFace]:
         self.sizes.append(pixels.shape[1::-1])
-        return self.faces.pop(0)
+        face = self.faces.pop(0)
+        return [] if face is None else [face]
 
 
 def prepared(head: Head, layout: Layout) -> Starter:

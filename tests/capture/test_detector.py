@@ -86,6 +86,9 @@ def test_face_on_its_side(
         rotation = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]) @ rotation
         size = size[::-1]
     assert shift(turned, truth) < 1e-6
+    assert yaw_pitch(turned.R_cam_head) == pytest.approx(yaw_pitch(upright.R_cam_head))
+    np.testing.assert_allclose(turned.blendshapes, upright.blendshapes, atol=1e-9)
+    np.testing.assert_allclose(turned.confidence, upright.confidence, atol=1e-9)
     np.testing.assert_allclose(turned.R_cam_head, rotation, atol=1e-9)
     assert turned.notes == (f"the face was found after turning the photo by {degrees} degrees",)
 
@@ -133,3 +136,56 @@ def test_small_faces(
         EstimationError, match=r"face\.png: the face is too small, 1\d px between the eyes; 20"
     ):
         detector.detect(as_photo(resized(faces["right"], 54)))
+
+
+def test_faces_of_a_turned_photo_are_counted_as_it_stands(
+    detector: LandmarkDetector, faces: dict[str, Array], as_photo: AsPhoto
+) -> None:
+    both = np.zeros((800, 1050, 3), np.uint8)
+    both[:, 450:] = faces["left"]
+    both[100:700, :450] = resized(faces["right"], 450)
+    photo = as_photo(np.rot90(both, 2))
+    largest = detector.detect(photo)
+    assert largest.points[NOSE_TIP, 0] < 600
+    assert largest.notes[0] == "2 faces: number 1 from the left, the largest, is used"
+    assert detector.detect(photo, face=2).points[NOSE_TIP, 0] > 600
+
+
+def test_the_smaller_of_two_near_faces_stays_itself(
+    detector: LandmarkDetector, faces: dict[str, Array], as_photo: AsPhoto
+) -> None:
+    both = np.zeros((800, 760, 3), np.uint8)
+    both[:, 160:] = faces["left"]
+    both[100:380, :210] = resized(faces["right"], 210)
+    found = detector.detect(as_photo(both), face=1)
+    alone = detector.detect(as_photo(resized(faces["right"], 210)))
+    assert shift(found, alone.points + np.array([0, 100])) < 0.03
+
+
+@pytest.mark.parametrize("edge", ["left", "top", "right", "bottom"])
+def test_what_lies_outside_of_the_photo_has_no_confidence(
+    detector: LandmarkDetector, faces: dict[str, Array], as_photo: AsPhoto, edge: str
+) -> None:
+    whole = detector.detect(as_photo(faces["right"]))
+    assert not whole.notes
+    low, high = whole.points.min(axis=0).astype(int), whole.points.max(axis=0).astype(int)
+    quarter = (high - low) // 4
+    left, top, right, bottom = 0, 0, *faces["right"].shape[1::-1]
+    match edge:
+        case "left":
+            left = low[0] + quarter[0]
+        case "top":
+            top = low[1] + quarter[1]
+        case "right":
+            right = high[0] - quarter[0]
+        case _:
+            bottom = high[1] - quarter[1]
+    cut = detector.detect(as_photo(faces["right"][top:bottom, left:right]))
+    outside = ((cut.points < 0) | (cut.points > [right - left, bottom - top])).any(axis=1)
+    assert 20 < outside.sum() < 240
+    assert (cut.confidence[outside] == 0).all()
+    assert (cut.confidence[~outside] > 0).sum() > 150
+    assert cut.notes == (
+        f"the edge cuts the face, {outside.sum()} of its 478 points lie outside of the picture: "
+        "they are a guess",
+    )

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mien.capture.landmarks import Landmarks, facing_confidence
+from mien.capture.landmarks import Landmarks, cut_note, facing_confidence, inside_picture, is_cut
 from mien.errors import InputError
 
 FRONTAL = np.diag([1.0, -1.0, -1.0])
@@ -48,3 +48,21 @@ def test_bad_arrays_are_named() -> None:
     ):
         with pytest.raises(InputError, match=f"^{name}: expected"):
             Landmarks(**{**good, name: bad})
+
+
+def test_points_beyond_the_edge_are_told_from_those_in_the_picture() -> None:
+    points = np.array([[-1.0, 5], [0, 0], [50, 40], [50, 40.5], [51, 20], [20, 30]])
+    expected = [False, True, True, False, False, True]
+    assert inside_picture(points, (50, 40)).tolist() == expected
+
+
+def test_a_face_is_cut_from_two_hundredths_of_its_width_beyond_the_edge_on() -> None:
+    face = np.array([[0.0, 10], [100, 10], [50, 80]])
+    assert not is_cut(face, (100, 80))
+    assert not is_cut(face + np.array([1.9, 0]), (100, 80))
+    assert is_cut(face + np.array([2.1, 0]), (100, 80))
+    assert is_cut(face - np.array([0, 12.1]), (100, 80))
+    assert cut_note(face + np.array([1.9, 0]), (100, 80)) == ()
+    assert cut_note(face - np.array([0, 12.1]), (100, 80)) == (
+        "the edge cuts the face, 2 of its 3 points lie outside of the picture: they are a guess",
+    )

@@ -78,3 +78,13 @@ def test_yaw_pitch_of_known_rotations(yaw: float, pitch: float) -> None:
         [[1, 0, 0], [0, np.cos(pitch), -np.sin(pitch)], [0, np.sin(pitch), np.cos(pitch)]]
     )
     assert yaw_pitch(np.diag([1.0, -1.0, -1.0]) @ turn @ tip) == pytest.approx((yaw, pitch))
+
+
+@pytest.mark.parametrize("roll", [-3.1, -np.pi / 2, -0.4, 0.7, np.pi / 2, np.pi])
+def test_yaw_and_pitch_do_not_depend_on_how_the_picture_lies(roll: float) -> None:
+    cos, sin = np.cos(roll), np.sin(roll)
+    in_plane = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+    turn = np.array([[np.cos(0.6), 0, np.sin(0.6)], [0, 1, 0], [-np.sin(0.6), 0, np.cos(0.6)]])
+    tip = np.array([[1, 0, 0], [0, np.cos(0.2), -np.sin(0.2)], [0, np.sin(0.2), np.cos(0.2)]])
+    upright = np.diag([1.0, -1.0, -1.0]) @ turn @ tip
+    assert yaw_pitch(in_plane @ upright) == pytest.approx((0.6, 0.2))

@@ -239,3 +239,14 @@ def test_seven_views_of_a_scan(shared: Path) -> None:
     capture = load_capture(shared / "data/emily/renders_mentalray", max_side=800)
     assert len(capture.views) == 7
     assert [note for note in capture.notes if "scaled from" not in note] == []
+
+
+def test_one_viewpoint_is_noted_of_a_photo_on_its_head(
+    tmp_path: Path, faces: dict[str, Array]
+) -> None:
+    put(tmp_path / "a.png", faces["left"])
+    put(tmp_path / "b.png", np.rot90(np.roll(faces["left"], 40, axis=1), 2))
+    note = load_capture(tmp_path).notes[-1]
+    assert note.startswith("neutral: its 2 photos look from nearly one side (yaw spans ")
+    spans = [float(word) for word in note.split("yaw spans ")[1].split() if word.isdecimal()]
+    assert max(spans) <= 3

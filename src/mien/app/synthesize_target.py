@@ -11,7 +11,7 @@ import numpy as np
 
 from mien.app.example_marks import mark_files, mark_notes, read_marks, with_marks
 from mien.arrays import Array, Float, Int
-from mien.capture.photos import Photo, load_photo
+from mien.capture.photos import load_photo
 from mien.errors import EstimationError, InputError
 from mien.formats.atomic import check_file_place, check_files_apart
 from mien.formats.image import image_kind
@@ -126,7 +126,7 @@ def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int |
         detected = steady_points(layout, detector, photo.pixels, landmarks.points)
     points = with_marks(layout, detected, read_marks(Path(path), photo, layout))
     motion = synthesizer.head_motion(points)
-    notes = [*photo.notes, *landmarks.notes, *_cut_notes(synthesizer, photo, path, points)]
+    notes = [*photo.notes, *(f"{path}: {note}" for note in landmarks.notes)]
     notes += [*mark_notes(Path(path), layout), *_stranger_notes(synthesizer, path, points)]
     if motion.scale > _LARGER:
         times = f"{float(motion.scale):.1f} times as large as in the examples"
@@ -161,15 +161,6 @@ def _outside_notes(
         raise InputError(path, expected, f"{layout.names[known[worst]]} at {place}")
     told = _told_outside(layout.names, known, beyond)
     return (f"{path}: {told}",) if told else ()
-
-
-def _cut_notes(
-    synthesizer: Synthesizer, photo: Photo, path: str | Path, points: Float[Array, "n 2"]
-) -> tuple[str, ...]:
-    """That the photo's edge cuts the face."""
-    names = synthesizer.examples.layout.names
-    told = _told_outside(names, np.arange(len(names)), _beyond(points, photo.size))
-    return (f"{path}: the edge cuts the face, {told}: they are a guess",) if told else ()
 
 
 def _beyond(points: Float[Array, "k 2"], size: tuple[int, int]) -> Float[Array, " k"]:

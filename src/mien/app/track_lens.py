@@ -11,6 +11,7 @@ from mien.arrays import Array, UInt8
 from mien.capture.frames_ahead import frames_ahead
 from mien.capture.video import Video, VideoFacts
 from mien.track.focal import estimate_focal
+from mien.track.lens import expected_focal
 
 if TYPE_CHECKING:
     from mien.build import Progress
@@ -30,7 +31,10 @@ def find_focal(
     """
     total = min(facts.frames or _FIRST, _FIRST)
     tell(LENS, 0, total)  # at once: making the head ready takes seconds
-    found = estimate_focal(_first(clip, total, tell), ready.starter, ready.head)
+    expected = expected_focal(ready.head, facts.width, facts.height)
+    tracker = ready.tracker(facts.width, facts.height, expected.focal_px)
+    frames = _first(clip, total, tell)
+    found = estimate_focal(frames, ready.starter, ready.head, is_own=tracker.resembles)
     reduced = min(1.0, _SIDE / max(facts.width, facts.height))
     return found.focal_px / reduced, found.note
 

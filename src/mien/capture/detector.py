@@ -10,7 +10,7 @@ import numpy as np
 
 from mien.arrays import Array, UInt8
 from mien.assets.detector import detector_model_path
-from mien.capture.landmarks import Landmarks, facing_confidence
+from mien.capture.landmarks import Landmarks, cut_note, facing_confidence, inside_picture
 from mien.capture.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace, FaceNetwork
 from mien.capture.photos import Photo, shrunk
 from mien.errors import EstimationError, InputError
@@ -84,23 +84,48 @@ class LandmarkDetector:
         sight = self._best_sight(photo, face)
         if sight is None:
             raise NoFaceError(f"{photo.name}: {NO_FACE}")
-        return _landmarks(photo.name, sight)
+        return _landmarks(photo, sight)
 
     def detect_fast(self, pixels: UInt8[Array, "h w 3"]) -> DetectedFace | None:
         """The largest face after a single pass, upright only: for the frames of a video."""
-        return max(self._network.faces(pixels), key=lambda found: found.width, default=None)
+        return next(iter(self.all_fast(pixels)), None)
+
+    def all_fast(self, pixels: UInt8[Array, "h w 3"]) -> list[DetectedFace]:
+        """Every face, the largest first, after a single pass, upright only."""
+        return sorted(self._network.faces(pixels), key=lambda found: -found.width)
+
+    def all_in_parts(self, pixels: UInt8[Array, "h w 3"]) -> list[DetectedFace]:
+        """Upright faces too small to be seen in the whole: in nine overlapping halves."""
+        height, width = pixels.shape[:2]
+        faces: list[DetectedFace] = []
+        if min(height, width) < 2:
+            return faces
+        for top in (0, height // 4, height // 2):
+            for left in (0, width // 4, width // 2):
+                part = pixels[top : top + height // 2, left : left + width // 2]
+                small = shrunk(part, _SEARCH_SIDE // 2)
+                factor = part.shape[1] / small.shape[1]
+                for found in self._network.faces(small):
+                    moved = _moved(found, factor, (left, top))
+                    if not any(same_place(moved, other) for other in faces):
+                        faces.append(moved)
+        return faces
 
     def _best_sight(self, photo: Photo, face: int | None) -> _Sight | None:
         """The photo as it stands, in parts, then turned, until a face holds still."""
-        upright = self._look(photo, face) or self._look_in_parts(photo, face)
+        upright = self._look(photo, face)
+        upright = upright or self._refine(photo, self.all_in_parts(photo.pixels), face, 0)
         if upright is not None and upright.steady:
             return upright
-        turned = (self._look(photo, face, quarters) for quarters in (1, 3, 2))
-        best = min(
-            (sight for sight in turned if sight is not None),
-            key=lambda sight: sight.shift,
-            default=None,
-        )
+        turned: list[_Sight | None] = []
+        for quarters in (1, 3, 2):
+            try:
+                turned.append(self._look(photo, face, quarters))
+            except InputError:
+                # That this copy shows fewer faces matters only where nothing else is found.
+                if upright is None and quarters == 2 and not any(turned):
+                    raise
+        best = min(filter(None, turned), key=lambda sight: sight.shift, default=None)
         if best is None or (upright is not None and best.shift > upright.shift / 2):
             return upright
         return best
@@ -113,51 +138,59 @@ class LandmarkDetector:
         factor = pixels.shape[1] / small.shape[1]
         return self._refine(photo, [_moved(found, factor) for found in faces], face, quarters)
 
-    def _look_in_parts(self, photo: Photo, face: int | None) -> _Sight | None:
-        """A face too small to be seen in the whole: nine overlapping halves."""
-        height, width = photo.pixels.shape[:2]
-        faces: list[DetectedFace] = []
-        if min(height, width) < 2:
-            return None
-        for top in (0, height // 4, height // 2):
-            for left in (0, width // 4, width // 2):
-                part = photo.pixels[top : top + height // 2, left : left + width // 2]
-                small = shrunk(part, _SEARCH_SIDE // 2)
-                factor = part.shape[1] / small.shape[1]
-                for found in self._network.faces(small):
-                    moved = _moved(found, factor, (left, top))
-                    if not any(_same_place(moved, other) for other in faces):
-                        faces.append(moved)
-        return self._refine(photo, faces, face, 0)
-
     def _refine(
         self, photo: Photo, faces: list[DetectedFace], face: int | None, quarters: int
     ) -> _Sight | None:
         """The chosen face seen again from near by."""
         if not faces:
             return None
-        chosen, notes = _choose(faces, face, photo.name)
         pixels = np.rot90(photo.pixels, quarters)
-        crop, left, top = _around(pixels, chosen)
-        small = shrunk(crop, _CROP_SIDE)
-        near = self.detect_fast(small)
-        shift = np.inf
-        if near is not None:
-            near = _moved(near, crop.shape[1] / small.shape[1], (left, top))
-            offsets = np.linalg.norm((near.points - chosen.points)[:, :2], axis=1)
-            shift = float(np.median(offsets)) / _eye_distance(near)
-        sight = _Sight(near or chosen, shift, quarters, notes)
-        return _turned_back(sight, pixels.shape[1], pixels.shape[0])
+        size = pixels.shape[1], pixels.shape[0]
+        standing = [_turned_back(found, quarters, size) for found in faces]
+        number, notes = _choose(standing, face, photo.name)
+        near = _from_near_by(self, pixels, faces[number], _CROP_SIDE)
+        if near is None:
+            return _Sight(standing[number], np.inf, quarters, notes)
+        offsets = np.linalg.norm((near.points - faces[number].points)[:, :2], axis=1)
+        shift = float(np.median(offsets)) / _eye_distance(near)
+        return _Sight(_turned_back(near, quarters, size), shift, quarters, notes)
 
 
-def look_twice(detector: LandmarkDetector, pixels: UInt8[Array, "h w 3"]) -> DetectedFace | None:
-    """The largest face, upright; one that is small is looked at again from near by."""
-    found = detector.detect_fast(pixels)
-    if found is None or found.width > SMALL * max(pixels.shape[:2]):
+def closer(
+    detector: LandmarkDetector, pixels: UInt8[Array, "h w 3"], found: DetectedFace
+) -> DetectedFace:
+    """A face found in a frame; one that is small is looked at again from near by."""
+    if found.width > SMALL * max(pixels.shape[:2]):
         return found
+    return _from_near_by(detector, pixels, found) or found
+
+
+def faces_around(
+    detector: LandmarkDetector,
+    pixels: UInt8[Array, "h w 3"],
+    place: tuple[float, float],
+    reach: float,
+) -> list[DetectedFace]:
+    """Upright faces in the square cut-out that reaches so many px to each side of a place."""
+    left, top = (max(int(middle - reach), 0) for middle in place)
+    right, bottom = (max(int(middle + reach), 0) for middle in place)
+    crop = np.ascontiguousarray(pixels[top:bottom, left:right])
+    if min(crop.shape[:2]) < 2:
+        return []
+    return [_moved(face, 1.0, (left, top)) for face in detector.all_fast(crop)]
+
+
+def _from_near_by(
+    detector: LandmarkDetector, pixels: Array, found: DetectedFace, side: int | None = None
+) -> DetectedFace | None:
+    """The same face in a cut-out around it, reduced to so many px where they are given."""
     crop, left, top = _around(pixels, found)
-    near = detector.detect_fast(np.ascontiguousarray(crop))
-    return found if near is None else _moved(near, 1.0, (left, top))
+    small = np.ascontiguousarray(crop if side is None else shrunk(crop, side))
+    factor = crop.shape[1] / small.shape[1]
+    seen = [_moved(face, factor, (left, top)) for face in detector.all_fast(small)]
+    # Somebody else may be larger in the cut-out.
+    near = [face for face in seen if same_place(face, found)]
+    return min(near, key=lambda face: _apart(face, found), default=None)
 
 
 @dataclass(frozen=True)
@@ -181,15 +214,16 @@ class _Sight:
         return self.shift < _STEADY and bool(up_in_image > 0.5)
 
 
-def _landmarks(name: str, sight: _Sight) -> Landmarks:
-    notes = list(sight.notes)
+def _landmarks(photo: Photo, sight: _Sight) -> Landmarks:
+    points = sight.face.points[:, :2]
+    notes = [*sight.notes, *cut_note(points, photo.size)]
     if sight.quarters:
         degrees = {1: 90, 2: 180, 3: -90}[sight.quarters]
         notes.append(f"the face was found after turning the photo by {degrees} degrees")
     distance = _eye_distance(sight.face)
     if distance < MIN_EYE_DISTANCE_PX:
         raise EstimationError(
-            f"{name}: the face is too small, {distance:.0f} px between the eyes; "
+            f"{photo.name}: the face is too small, {distance:.0f} px between the eyes; "
             f"{MIN_EYE_DISTANCE_PX:.0f} are needed, {GOOD_EYE_DISTANCE_PX:.0f} advised"
         )
     if distance < GOOD_EYE_DISTANCE_PX:
@@ -197,34 +231,39 @@ def _landmarks(name: str, sight: _Sight) -> Landmarks:
             f"the face is small, {distance:.0f} px between the eyes: expect "
             f"rough landmarks and texture; {GOOD_EYE_DISTANCE_PX:.0f} are advised"
         )
+    facing = facing_confidence(sight.face.points, sight.face.R_cam_head)
     return Landmarks(
-        sight.face.points[:, :2],
-        facing_confidence(sight.face.points, sight.face.R_cam_head),
+        points,
+        facing * inside_picture(points, photo.size),
         sight.face.blendshapes,
         sight.face.R_cam_head,
         tuple(notes),
     )
 
 
-def _choose(
-    faces: list[DetectedFace], face: int | None, name: str
-) -> tuple[DetectedFace, tuple[str, ...]]:
-    """The largest, or number `face` from the left; a note when there was a choice."""
-    ordered = sorted(faces, key=lambda found: float(found.points[:, 0].mean()))
+def _choose(faces: list[DetectedFace], face: int | None, name: str) -> tuple[int, tuple[str, ...]]:
+    """Which is the largest, or number `face` from the left; a note when there was a choice."""
+    ordered = sorted(range(len(faces)), key=lambda i: float(faces[i].points[:, 0].mean()))
     if face is not None:
         if face > len(ordered):
             raise InputError("face", f"1 to {len(ordered)}, the faces in {name}", face)
         return ordered[face - 1], ()
-    largest = max(range(len(ordered)), key=lambda i: ordered[i].width)
+    largest = max(ordered, key=lambda i: faces[i].width)
     if len(ordered) == 1:
-        return ordered[0], ()
-    note = f"{len(ordered)} faces: number {largest + 1} from the left, the largest, is used"
-    return ordered[largest], (note,)
+        return largest, ()
+    number = ordered.index(largest) + 1
+    note = f"{len(ordered)} faces: number {number} from the left, the largest, is used"
+    return largest, (note,)
 
 
-def _same_place(one: DetectedFace, other: DetectedFace) -> bool:
-    apart = np.linalg.norm((one.points - other.points).mean(axis=0)[:2])
-    return bool(apart < max(one.width, other.width) / 2)
+def same_place(one: DetectedFace, other: DetectedFace) -> bool:
+    """Whether two sights are of one face."""
+    return _apart(one, other) < max(one.width, other.width) / 2
+
+
+def _apart(one: DetectedFace, other: DetectedFace) -> float:
+    """Px between the middles of two faces."""
+    return float(np.linalg.norm((one.points - other.points).mean(axis=0)[:2]))
 
 
 def _eye_distance(face: DetectedFace) -> float:
@@ -246,11 +285,12 @@ def _around(pixels: Array, face: DetectedFace) -> tuple[Array, int, int]:
     return pixels[top:bottom, left:right], int(left), int(top)
 
 
-def _turned_back(sight: _Sight, width: int, height: int) -> _Sight:
-    """From the turned photo, of this size, to the photo as it stands."""
-    points, rotation = sight.face.points, sight.face.R_cam_head
-    for _ in range(sight.quarters):
+def _turned_back(face: DetectedFace, quarters: int, size: tuple[int, int]) -> DetectedFace:
+    """From a photo that was turned by quarters, then of this size, to the photo as it stands."""
+    points, rotation = face.points, face.R_cam_head
+    width, height = size
+    for _ in range(quarters):
         points = points @ _QUARTER.T + np.array([height, 0.0, 0.0])
         rotation = _QUARTER @ rotation
         width, height = height, width
-    return replace(sight, face=replace(sight.face, points=points, R_cam_head=rotation))
+    return replace(face, points=points, R_cam_head=rotation)

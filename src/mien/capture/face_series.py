@@ -10,12 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8
-from mien.capture.detector import LandmarkDetector, look_twice
+from mien.capture.detector import LandmarkDetector, closer
 from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
 from mien.capture.frame_choice import FrameScores
 from mien.capture.frame_photos import fetch_frames, frame_name
 from mien.capture.frames_ahead import frames_ahead
-from mien.capture.landmarks import Landmarks
 from mien.capture.mediapipe_face import DetectedFace
 from mien.capture.notes import gathered_notes
 from mien.capture.photos import Photo, load_photo
@@ -146,10 +145,11 @@ class _Gathered:
         total = video.facts().frames
         with frames_ahead(video, max_side=self.max_side) as pictures:
             for picture in pictures:
-                found = look_twice(detector, picture.pixels)
-                if found is None:
+                faces = detector.all_fast(picture.pixels)
+                if not faces:
                     self.left_out[frame_name(picture.frame)] = "no face found"
                 else:
+                    found = closer(detector, picture.pixels, faces[0])
                     self.seconds.append(picture.seconds)
                     self._add(frame_name(picture.frame), picture.frame, picture.pixels, found)
                 if report is not None:
@@ -185,7 +185,7 @@ class _Gathered:
             return
         self.told += [(name, note) for note in landmarks.notes]
         self.files.append(path)
-        self._add(name, number, photo.pixels, _as_detected(landmarks))
+        self._add(name, number, photo.pixels, landmarks.as_face())
 
     def _add(
         self, name: str, number: int, pixels: UInt8[Array, "h w 3"], found: DetectedFace
@@ -219,12 +219,6 @@ class _Gathered:
             (*self.notes, *gathered_notes(self.told)),
             self.quarters,
         )
-
-
-def _as_detected(landmarks: Landmarks) -> DetectedFace:
-    """What a closer look at a photo found, as a look at a frame gives it."""
-    points = np.column_stack([landmarks.points, np.zeros(len(landmarks.points))])
-    return DetectedFace(points, landmarks.blendshapes, landmarks.R_cam_head)
 
 
 def row_of(series: FaceSeries, what: str, option: str) -> int:

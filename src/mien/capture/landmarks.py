@@ -6,8 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mien.arrays import Array, Float, Int, check_array, check_rotation, frozen
-from mien.capture.mediapipe_face import LANDMARK_COUNT, LEFT_IRIS, RIGHT_IRIS
+from mien.arrays import Array, Bool, Float, Int, check_array, check_rotation, frozen
+from mien.capture.mediapipe_face import LANDMARK_COUNT, LEFT_IRIS, RIGHT_IRIS, DetectedFace
+
+CUT_SHARE = 0.02
+"""Of the face's width: how far over the edge of the picture a point may lie before the edge is said
+to cut the face."""
 
 
 @dataclass(frozen=True)
@@ -17,7 +21,7 @@ class Landmarks:
     Attributes:
         points: (478, 2) px of the photo.
         confidence: (478,) in [0, 1]: 1 where the surface faces the camera, 0 where it turns away;
-            roughly the inverse of the relative error.
+            roughly the inverse of the relative error; 0 outside of the photo.
         blendshapes: (52,) scores in [0, 1], ordered as `BLENDSHAPE_NAMES`: `_neutral`, then 51 of
             the ARKit units (no `tongueOut`).
         R_cam_head: (3, 3) the detector's own idea of the head's rotation; good to some 10 degrees.
@@ -41,10 +45,39 @@ class Landmarks:
             self, "R_cam_head", frozen(check_rotation("R_cam_head", self.R_cam_head))
         )
 
+    def as_face(self) -> DetectedFace:
+        """As a look at a frame gives it; of depth nothing is known."""
+        points = np.column_stack([self.points, np.zeros(LANDMARK_COUNT)])
+        return DetectedFace(points, self.blendshapes, self.R_cam_head)
+
     @property
     def eye_distance_px(self) -> float:
         """Between the irises, in the image."""
         return float(np.linalg.norm(self.points[LEFT_IRIS] - self.points[RIGHT_IRIS]))
+
+
+def inside_picture(
+    points: Float[Array, "n 2"], size: tuple[int, int] | Int[Array, " 2"]
+) -> Bool[Array, " n"]:
+    """Which points lie in a picture of this width and height; what a detector says of the others
+    is a guess."""
+    inside: Array = np.all((points >= 0) & (points <= np.asarray(size)), axis=1)
+    return inside
+
+
+def is_cut(points: Float[Array, "n 2"], size: tuple[int, int] | Int[Array, " 2"]) -> bool:
+    """Whether the edge of a picture of this width and height cuts a face with these points."""
+    room = CUT_SHARE * float(np.ptp(points[:, 0]))
+    return bool(((points < -room) | (points > np.asarray(size) + room)).any())
+
+
+def cut_note(points: Float[Array, "n 2"], size: tuple[int, int]) -> tuple[str, ...]:
+    """A note where the edge of the picture cuts the face; none where it does not."""
+    if not is_cut(points, size):
+        return ()
+    count = int((~inside_picture(points, size)).sum())
+    outside = f"{count} of its {len(points)} points lie outside of the picture"
+    return (f"the edge cuts the face, {outside}: they are a guess",)
 
 
 def facing_confidence(

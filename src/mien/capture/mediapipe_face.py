@@ -113,9 +113,13 @@ class DetectedFace:
 
 
 def yaw_pitch(R_cam_head: Float[Array, "3 3"]) -> tuple[float, float]:
-    """Radians: the head turned to its own left, and tipped down, as the camera sees it."""
-    x, y, z = R_cam_head[:, 2]
-    return float(np.arctan2(x, -z)), float(np.arcsin(np.clip(y, -1.0, 1.0)))
+    """Radians: the head turned to its own left, and tipped down, as the camera sees it.
+
+    They say from where the camera looks at the head, so a picture that lies or stands on its head
+    has those of the same picture upright.
+    """
+    x, y, z = -R_cam_head[2]
+    return float(-np.arcsin(np.clip(x, -1.0, 1.0))), float(np.arctan2(y, z))
 
 
 class FaceNetwork:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int
+from mien.capture.landmarks import is_cut
 
 __all__ = ["COVERED", "CUT", "unfit_reasons"]
 
 CUT, COVERED = "cut by the edge of the picture", "something is before the mouth"
 SMALL = "small"
 
-_OUTSIDE = 0.02
-"""px over the edge that a point may lie, in widths of the face."""
 _LEAST_WIDTH = 0.8
 """Of the usual width of the face: smaller ones have less to show."""
 
@@ -30,8 +29,7 @@ def unfit_reasons(
         covered: whether something is before the face.
     """
     widths = np.ptp(points[..., 0], axis=1)
-    room = (_OUTSIDE * widths)[:, None, None]
-    cut = ((points < -room) | (points > sizes[:, None] + room)).any(axis=(1, 2))
+    cut = np.array([is_cut(own, size) for own, size in zip(points, sizes, strict=True)], bool)
     share = widths / np.median(widths)
     faults: dict[str, Array] = {CUT: cut, COVERED: covered, SMALL: share < _LEAST_WIDTH}
     reasons = [""] * len(points)

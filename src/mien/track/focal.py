@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from mien.track.lens import LogFocal, expected_focal
 from mien.track.mark_fit import MOST, Guess, MarkProblem, Observation, fit_face
 from mien.track.marks import REPEATED_MM
 from mien.track.meant import at_landmarks
-from mien.track.start import Starter
+from mien.track.start import Found, Starter
 
 MOST_FRAMES = 8
 """More add little."""
@@ -32,6 +33,9 @@ _SHOWN = 0.65
 """Of a change of perspective, the detector's landmarks follow this share. The estimate is right all
 the same, for pictures of the head tell as much; but it is known less well by so much."""
 _LEAST_ROUNDS, _MOST_ROUNDS, _SETTLED, _FARTHEST = 3, 8, 0.01, 0.5
+_CLOSELY = 5
+"""Every so many frames that show no face of the head's, faces are sought that are too small to be
+found in the whole picture."""
 _FOCAL = UNKNOWNS - 1
 _LITTLE = 0.7
 
@@ -76,14 +80,19 @@ class FocalEstimator:
         self._off_in_frame = ways * (np.sqrt(2) * REPEATED_MM / spread)
         self._seen: list[Observation] = []
         self._guesses: list[Guess] = []
+        self._others: list[Guess] = []
 
     @property
     def frames_used(self) -> int:
         """How many frames are kept."""
         return len(self._seen)
 
-    def add(self, face: DetectedFace) -> bool:
-        """Keep a face, in px of the upright picture, if no other was seen as it is."""
+    def add(self, face: DetectedFace, is_own: Callable[[Found], bool] = lambda found: True) -> bool:
+        """Keep a face, in px of the upright picture, if no other was seen as it is.
+
+        Args:
+            is_own: whether the face, which is found there, is the head's.
+        """
         if self.frames_used == MOST_FRAMES:
             return False
         seen = Observation.of(self._starter.marks, face, self._size)
@@ -92,7 +101,11 @@ class FocalEstimator:
             guess = fit_face(seen, self._starter.layout, focal, start=seen.start(focal))
         except EstimationError:
             return False
-        if any(_alike(guess, other) for other in self._guesses):
+        if any(_alike(guess, other) for other in (*self._guesses, *self._others)):
+            return False
+        found = self._starter.fit(face, size=self._size, focal_px=focal)
+        if found is None or not is_own(found):
+            self._others.append(guess)
             return False
         self._seen.append(seen)
         self._guesses.append(guess)
@@ -205,23 +218,27 @@ def estimate_focal(
     head: Head,
     *,
     expected: LogFocal | None = None,
+    is_own: Callable[[UInt8[Array, "h w 3"], Found], bool] = lambda pixels, found: True,
 ) -> FocalEstimate:
     """The focal length of a video from some of its first frames, every fifth, say.
 
     Args:
         frames: upright pictures of one size, at most as many as are worth 10 ms each.
         expected: what is known before; by default lens.expected_focal.
+        is_own: whether a face found in a picture is the head's.
     Raises: InputError: no frames.
     """
     estimator, size = None, None
-    for pixels in frames:
+    for number, pixels in enumerate(frames):
         if estimator is None:
             size = (pixels.shape[1], pixels.shape[0])
             expected = expected or expected_focal(head, *size)
             estimator = FocalEstimator(starter, head, size, expected)
-        face = starter.look(pixels)
-        if face is not None:
-            estimator.add(face)
+        for face in starter.look(pixels):
+            estimator.add(face, partial(is_own, pixels))
+        if not estimator.frames_used and number % _CLOSELY == 0:
+            for face in starter.look_closely(pixels):
+                estimator.add(face, partial(is_own, pixels))
     if estimator is None or size is None or expected is None:
         raise InputError("frames", "at least one", "none")
     try:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mien.arrays import Array, Float, Int
+from mien.capture.landmarks import inside_picture
 from mien.capture.mediapipe_face import BLENDSHAPE_NAMES, DetectedFace
 from mien.model.dense.projection import UNKNOWNS, Pinholes, project_places
 from mien.numeric.lm import minimize_lm
@@ -84,6 +85,7 @@ class Observation:
     def of(marks: Marks, face: DetectedFace, size: tuple[int, int]) -> Observation:
         """Of a face that was found in a picture of this width and height."""
         trust = facing_share(-(marks.normals @ face.R_cam_head.T)[:, 2])
+        trust = trust * inside_picture(face.points[:, :2], size)
         kept = np.flatnonzero(np.isfinite(marks.sigma_mm) & (trust > 0))
         return Observation(
             places=marks.places[kept],
@@ -111,6 +113,12 @@ class Observation:
         wanted = focal_px * in_camera[:, :2] / in_camera[:, 2:] + np.array(size) / 2
         errors = shown.points[self.kept, :2] - wanted
         return replace(self, image_points=self.image_points - errors)
+
+    def misfit_mm(self, guess: Guess, focal_px: float) -> float:
+        """How far off the landmarks are from where they lie on a head, RMS."""
+        x, y, z = (self.on(guess) @ guess.R.T + guess.t).T
+        off = np.stack([x, y]) * focal_px / z - self.image_points.T
+        return float(np.sqrt(((off * guess.t[2] / focal_px) ** 2).sum(axis=0).mean()))
 
     def start(self, focal_px: float) -> Guess:
         """The neutral head turned as the detector says, where its landmarks agree best."""

@@ -7,6 +7,7 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
+from mien.capture.landmarks import inside_picture
 from mien.capture.mediapipe_face import LEFT_IRIS, RIGHT_IRIS
 from mien.capture.source import View
 
@@ -20,9 +21,12 @@ def iris_directions(
 ) -> Float[Array, "2 3"] | None:
     """(2, 3) unit vectors from the centres of the left and the right eyeball to their irises.
 
-    None where no landmarks are.
+    None where no landmarks are, or an iris lies outside of the photo.
     """
     if view.landmarks is None:
+        return None
+    irises = view.landmarks.points[list(EYEBALLS.values())]
+    if not inside_picture(irises, view.photo.size).all():
         return None
     places = generic.landmark_positions(vertices)
     directions = np.empty((2, 3))
