@@ -149,6 +149,9 @@ class Video:
 
         check_readable(self.path, "a video")
         try:
+            # From PyAV 19 on, metadata that are not UTF-8 stop no reader, and nothing sets it.
+            if int(av.__version__.split(".")[0]) >= 19:
+                return av.open(str(self.path))
             return av.open(str(self.path), metadata_errors="replace")
         except av.FFmpegError as error:
             found = f"{kind_of(self.path)} ({one_line(error.strerror or error)})"
