@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-from numba import njit
 
 from mien.arrays import Array, Float, Int, frozen
+from mien.numeric.jit import njit
 from mien.numeric.threads import for_row_bands
 
 _LEAF = 4

@@ -48,6 +48,15 @@ def test_a_clip_that_changes_its_size_keeps_the_first(
         assert np.abs(picture - pictures[0]).mean() < 6
 
 
+def test_metadata_that_are_not_utf8_stop_nothing(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.mkv", grey([20, 60, 100]))
+    data = path.read_bytes()
+    # Matroska states who wrote the file at its head, which FFmpeg hands on as metadata.
+    assert b"Lavf" in data
+    path.write_bytes(data.replace(b"Lavf", b"L\xfcv\xff"))
+    assert len(list(Video(path).frames())) == 3
+
+
 @pytest.mark.parametrize("max_side", [320, 250])
 def test_pictures_reduced_in_size(tmp_path: Path, faces: dict[str, Array], max_side: int) -> None:
     """As good as averaging the converted picture, and not shifted against it."""

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from mien.numeric.kernel_files import kernel_folders, kernels_are_kept
 
 if TYPE_CHECKING:
     from rich.progress import Task
 
     from mien.build import Progress
+
+_COMPILING = "First run: compiling kernels on the way, once, some 15 s."
+_COMPILING_EVERY_TIME = (
+    "Compiling kernels on the way, some 15 s: no folder to keep them can be written to. "
+    "NUMBA_CACHE_DIR may name one."
+)
 
 
 @contextmanager
@@ -43,8 +49,8 @@ def terminal_progress(quiet: bool, *, counted: Collection[str] = ()) -> Iterator
 
     def advance(stage: str, done: int, total: int) -> None:
         if not tasks:
-            if not _kernels_are_compiled():
-                bars.console.print("First run: compiling kernels on the way, once, some 15 s.")
+            if not kernels_are_kept():
+                bars.console.print(_COMPILING if kernel_folders() else _COMPILING_EVERY_TIME)
             bars.start()
         if stage not in tasks:
             tasks[stage] = bars.add_task(stage, total=total or None, speed="")
@@ -62,10 +68,3 @@ def terminal_progress(quiet: bool, *, counted: Collection[str] = ()) -> Iterator
 def _speed(task: Task) -> str:
     """Over the last half-minute; what an earlier run had done does not count."""
     return f"{task.speed:.1f} frames/s" if task.speed else ""
-
-
-def _kernels_are_compiled() -> bool:
-    """Whether Numba has kept machine code of mien from an earlier run."""
-    place = os.environ.get("NUMBA_CACHE_DIR")
-    folder = Path(place) if place else Path(__file__).parents[1]
-    return next(folder.rglob("*.nbi"), None) is not None

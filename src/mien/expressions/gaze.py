@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, Int, frozen
 from mien.assets.generic import GenericHead
 from mien.expressions.followers import part_vertices
+from mien.numeric.jit import njit
 
 SIDES = ("left", "right")
 _LAG = 0.35

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Bool, Float
+from mien.numeric.jit import njit
 
 _ALLOWED = 1e-6
 _ROUNDS = 4

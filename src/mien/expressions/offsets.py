@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, Int, frozen
+from mien.numeric.jit import njit
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ def _normal_equations(
     number: Int[Array, " v"],
 ) -> tuple[Any, Array]:
     """J^T W J and -J^T W r over the skin's movements."""
-    from scipy.sparse import csr_matrix, diags
+    from scipy.sparse import csr_array, diags_array
 
     misses = measure_misses(sightings, sightings.on(vertices) + sightings.beside, cameras)
     used: Bool[Array, " m"] = np.asarray((number[sightings.corners] >= 0).all(axis=1))
@@ -88,8 +88,8 @@ def _normal_equations(
     rows = np.arange(2 * count).reshape(-1, 2)[:, :, None, None]
     rows, columns = (np.broadcast_to(index, values.shape).ravel() for index in (rows, columns))
     shape = (2 * count, 3 * int(number.max() + 1))
-    jacobian = csr_matrix((values.ravel(), (rows, columns)), shape=shape)
-    weighted = diags(np.repeat(np.where(used, misses.weights, 0.0), 2)) @ jacobian
+    jacobian = csr_array((values.ravel(), (rows, columns)), shape=shape)
+    weighted = diags_array(np.repeat(np.where(used, misses.weights, 0.0), 2)) @ jacobian
     return jacobian.T @ weighted, -(weighted.T @ misses.residuals.ravel())
 
 
@@ -100,16 +100,15 @@ def _stiffness(
 
     Source: the thin plate on a mesh, L^T M^-1 L (Botsch and Kobbelt, 2004).
     """
-    from scipy.sparse import block_diag, diags, kron
-    from scipy.sparse import identity as eye
+    from scipy.sparse import bsr_array, diags_array, eye_array, kron
 
     laplacian, areas = cotangent_laplacian(mesh.vertices, mesh.triangles[mesh.triangles_of("skin")])
     laplacian, areas = laplacian[skin][:, skin], areas[skin]
     spring = BENDING * areas / REACH_MM**4 + areas * held[skin] ** 2 / HELD_SD_MM**2
-    bending = BENDING * laplacian.T @ diags(1 / areas) @ laplacian + diags(spring)
-    stiffness = kron(bending, eye(3), format="csr")
+    bending = BENDING * laplacian.T @ diags_array(1 / areas) @ laplacian + diags_array(spring)
+    stiffness = kron(bending, eye_array(3), format="csr")
     if across_sd_mm is None:
         return stiffness
     normals = mesh.vertex_normals()[skin]
     across = normals[:, :, None] * normals[:, None, :] * areas[:, None, None] / across_sd_mm**2
-    return stiffness + block_diag(list(across), format="csr")
+    return stiffness + bsr_array((across, np.arange(len(skin)), np.arange(len(skin) + 1))).tocsr()

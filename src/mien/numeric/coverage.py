@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, Int
+from mien.numeric.jit import njit
 from mien.numeric.raster import edge_line
 
 STRIP = 36

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Bool, Float, Int
+from mien.numeric.jit import njit
 
 
 def depths_below(

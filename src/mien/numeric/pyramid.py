@@ -8,10 +8,10 @@ ends of the image touch, as on a cylinder.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Bool, Float, check_array
 from mien.errors import InputError
+from mien.numeric.jit import njit
 
 
 def fill_pyramid(

@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, Int, check_array, check_positive, frozen
 from mien.errors import InputError
+from mien.numeric.jit import njit
 from mien.numeric.threads import for_row_bands
 
 _ABOVE_ZERO = float(np.nextafter(0.0, 1.0))

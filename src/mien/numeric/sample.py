@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, check_array, frozen
 from mien.errors import InputError
+from mien.numeric.jit import njit
 from mien.numeric.threads import for_row_bands
 
 

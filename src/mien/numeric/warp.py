@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, Int, check_array, frozen
 from mien.errors import InputError
+from mien.numeric.jit import njit
 from mien.numeric.raster import check_triangles
 
 __all__ = ["SUBPIXELS", "affine_maps", "cut_row", "extents", "facing", "snapped"]

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, Int, UInt8, frozen
 from mien.camera import Camera
 from mien.errors import InputError
 from mien.mesh import Mesh
 from mien.numeric.coverage import STRIP, Coverage, barycentrics_at, cover_strip, prepare_coverage
+from mien.numeric.jit import njit
 from mien.numeric.threads import for_row_bands
 from mien.render.mipmap import (
     Pyramids,

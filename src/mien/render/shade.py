@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, UInt8, check_array, frozen
 from mien.camera import Camera
 from mien.errors import InputError
 from mien.mesh import Mesh
+from mien.numeric.jit import njit
 from mien.numeric.raster import Raster, interpolate, rasterize
 from mien.numeric.threads import for_row_bands
 from mien.render.mipmap import build_pyramids

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, frozen
+from mien.numeric.jit import njit
 from mien.numeric.sample import bilinear_place
 from mien.numeric.threads import for_row_bands
 from mien.texture.surface import SurfaceMap

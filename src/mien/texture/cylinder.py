@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, frozen
 from mien.errors import InputError
 from mien.mesh import Mesh
+from mien.numeric.jit import njit
 from mien.numeric.threads import for_row_bands
 from mien.texture.surface import SurfaceMap, surface_from
 

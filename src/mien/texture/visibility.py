@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Bool, Float, UInt8, check_image, check_positive, frozen
 from mien.camera import Camera
 from mien.errors import InputError
 from mien.mesh import Mesh
+from mien.numeric.jit import njit
 from mien.numeric.raster import rasterize
 from mien.numeric.sample import bilinear_place
 from mien.numeric.threads import for_row_bands

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float
+from mien.numeric.jit import njit
 from mien.track.looks import Pictures
 from mien.track.views import BRIGHTEST, View
 

@@ -8,9 +8,9 @@ that nothing of the background, or of a hand before the face, gets in.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float
+from mien.numeric.jit import njit
 from mien.numeric.threads import for_row_bands
 
 _PARTS = 2

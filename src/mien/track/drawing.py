@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Bool, Float, Int, frozen
 from mien.expressions.state import PosedFace
+from mien.numeric.jit import njit
 from mien.numeric.raster import Raster, rasterize_rows, unfilled
 from mien.numeric.threads import for_row_bands
 from mien.render.mipmap import Four, Pyramids, level_of_detail, place_lookup, weighted_texels

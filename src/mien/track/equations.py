@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, Int
+from mien.numeric.jit import njit
 from mien.numeric.threads import for_row_bands
 from mien.track.flows import POSE_UNKNOWNS, Flows, pose_flow
 from mien.track.samples import Answers, Moved, Samples, look_up

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float
+from mien.numeric.jit import njit
 from mien.track.drawing import Lens, Pose, lens_of
 from mien.track.views import View
 

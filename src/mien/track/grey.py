@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Int, UInt16, frozen
+from mien.numeric.jit import njit
 from mien.render.mipmap import UNIT, Four, Pyramids
 
 LUMA = (0.299, 0.587, 0.114)

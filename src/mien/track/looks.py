@@ -8,9 +8,9 @@ from functools import cached_property
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, Int
+from mien.numeric.jit import njit
 from mien.numeric.threads import for_row_bands
 from mien.track.bands import band_pass, odd
 from mien.track.drawing import Drawing, Lens, draw, lens_of

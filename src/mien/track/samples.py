@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, Int
+from mien.numeric.jit import njit
 from mien.numeric.threads import for_row_bands
 from mien.track.drawing import Drawing, Lens
 

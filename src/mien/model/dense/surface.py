@@ -105,13 +105,13 @@ def sample_heights(
     Source: perturb and solve (Papandreou and Yuille, 2010): with data and stiffness perturbed by
     their own noise, the solutions scatter as the posterior does.
     """
-    from scipy.sparse import diags
+    from scipy.sparse import diags_array
     from scipy.sparse.linalg import splu
 
     surface = _height_problem(generic)
     spread, used = surface.at(tracks)
     weights = used / offsets.sd**2
-    matrix = (spread.T @ diags(weights) @ spread + surface.stiffness).tocsc()
+    matrix = (spread.T @ diags_array(weights) @ spread + surface.stiffness).tocsc()
     rng = np.random.default_rng(seed)
     count = len(weights)
     data = spread.T @ (np.sqrt(weights)[:, None] * rng.normal(size=(count, draws)))
@@ -127,18 +127,18 @@ def _solve_heights(
     mesh: Mesh,
     directions: Float[Array, "v 3"],
 ) -> Float[Array, " v"]:
-    from scipy.sparse import diags
+    from scipy.sparse import diags_array
     from scipy.sparse.linalg import splu
 
     spread, used = surface.at(tracks)
     # Offsets are along the normals, heights along smoother directions.
     normals = mesh.vertex_normals()
     straightness = (tracks.on(normals) * tracks.on(directions)).sum(axis=1)
-    spread = diags(np.maximum(straightness, _LEAST_STRAIGHT)) @ spread
+    spread = diags_array(np.maximum(straightness, _LEAST_STRAIGHT)) @ spread
     heights, left = np.zeros(spread.shape[1]), offsets.along_normal
     for _ in range(_ROUNDS):
         weights = used / (offsets.sd**2 * (1 + (left / (_WRONG_SDS * offsets.sd)) ** 2))
-        matrix = (spread.T @ diags(weights) @ spread + surface.stiffness).tocsc()
+        matrix = (spread.T @ diags_array(weights) @ spread + surface.stiffness).tocsc()
         heights = splu(matrix).solve(spread.T @ (weights * offsets.along_normal))
         left = offsets.along_normal - spread @ heights
     return heights
@@ -184,11 +184,11 @@ class _HeightProblem:
 
     def at(self, tracks: Tracks) -> tuple[Any, Bool[Array, " n"]]:
         """(N, V) sparse: heights of the vertices to heights at the places; which have one."""
-        from scipy.sparse import csr_matrix
+        from scipy.sparse import csr_array
 
         count = len(tracks.corners)
         rows = np.repeat(np.arange(count), 3)
-        spread = csr_matrix(
+        spread = csr_array(
             (tracks.barycentrics.ravel(), (rows, tracks.corners.ravel())),
             shape=(count, len(self.outer)),
         )
@@ -202,7 +202,7 @@ def _height_problem(generic: GenericHead) -> _HeightProblem:
     Source: the thin plate on a mesh, L^T M^-1 L with cotangent Laplacian L and areas M
     (Botsch and Kobbelt, 2004).
     """
-    from scipy.sparse import csr_matrix, diags, vstack
+    from scipy.sparse import csr_array, diags_array, vstack
 
     vertices = generic.mesh.vertices
     skin = generic.mesh.triangles[generic.mesh.triangles_of("skin")]
@@ -212,15 +212,17 @@ def _height_problem(generic: GenericHead) -> _HeightProblem:
     outer[triangles] = True
     laplacian, areas = cotangent_laplacian(vertices, triangles)
     spring = np.where(outer, np.sqrt(BENDING * areas) / _REACH_MM**2, 1.0)
-    root = csr_matrix(
-        vstack([np.sqrt(BENDING) * diags(1 / np.sqrt(areas)) @ laplacian, diags(spring)])
+    root = csr_array(
+        vstack(
+            [np.sqrt(BENDING) * diags_array(1 / np.sqrt(areas)) @ laplacian, diags_array(spring)]
+        )
     )
-    return _HeightProblem(outer, csr_matrix(root.T @ root), root)
+    return _HeightProblem(outer, csr_array(root.T @ root), root)
 
 
 def cotangent_laplacian(vertices: Array, triangles: Array) -> tuple[Any, Array]:
     """Cotangent Laplacian (V, V) and each vertex's area, mm^2."""
-    from scipy.sparse import csr_matrix, diags
+    from scipy.sparse import csr_array, diags_array
 
     count = len(vertices)
     rows, columns, values = [], [], []
@@ -235,9 +237,9 @@ def cotangent_laplacian(vertices: Array, triangles: Array) -> tuple[Any, Array]:
         columns += [triangles[:, c], triangles[:, b]]
         values += [cotangent, cotangent]
         np.add.at(areas, triangles[:, a], twice_area / 6)
-    weights = csr_matrix(
+    weights = csr_array(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
         shape=(count, count),
     )
-    degree = diags(np.asarray(weights.sum(axis=1)).ravel())
+    degree = diags_array(weights.sum(axis=1))
     return degree - weights, np.maximum(areas, 1e-3)
