@@ -40,7 +40,12 @@ def grey(levels: Iterable[int]) -> list[Array]:
 
 def flagged(path: Path, quarters: int) -> Path:
     """The .mp4, which says now that it is to be turned by so many quarters counterclockwise."""
-    a, b, c, d = (65536 * entry for entry in QUARTER_TURNS[quarters])
+    return shown_by(path, *QUARTER_TURNS[quarters])
+
+
+def shown_by(path: Path, *matrix: int) -> Path:
+    """The .mp4, which says now that it is to be shown by this display matrix."""
+    a, b, c, d = (65536 * entry for entry in matrix)
     data = path.read_bytes()
     upright = struct.pack(">9i", 65536, 0, 0, 0, 65536, 0, 0, 0, 1 << 30)
     place = data.index(upright, data.index(b"tkhd"))

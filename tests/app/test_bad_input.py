@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -68,6 +69,83 @@ def test_no_face(wall: Array, mien: Mien, tmp_path: Path) -> None:
     error = mien("build", tmp_path / "walls", "-o", tmp_path / "head", "--json").error
     assert error.startswith(f"{tmp_path / 'walls'}: no photo shows a face")
     assert "wall.png: left out: no face found" in error
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        (("build", "", "-o", "x"), "argument 1 of `mien build`"),
+        (("examples", "", "-o", "x"), "argument 1 of `mien examples`"),
+        (("track", "", "--head", "x", "-o", "x.csv"), "argument 1 of `mien track`"),
+        (("render", "", "-o", "x.png"), "argument 1 of `mien render`"),
+        (("build", "x", "-o", ""), "-o"),
+        (("synthesize", "x", "--photo", "", "-o", "x.png"), "--photo"),
+        (("track", "x", "--head=", "-o", "x.csv"), "--head"),
+    ],
+)
+def test_nothing_given_is_not_the_current_folder(
+    arguments: tuple[str, ...],
+    name: str,
+    mien: Mien,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert mien(*arguments).error.startswith(f"{name}: expected something")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", ["build", "examples"])
+def test_what_mien_made_is_no_source(
+    command: str, built: Built, mien: Mien, tmp_path: Path
+) -> None:
+    (tmp_path / "made").mkdir()
+    (tmp_path / "made" / "examples.json").write_text('{"format": "mien examples"}')
+    for source, kind in ((built.folder, "a head"), (tmp_path / "made", "an example")):
+        error = mien(command, source, "-o", tmp_path / "out").error
+        found = f"{kind} folder that mien made of them"
+        assert error == f"{source}: expected photos or a video, got {found}"
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+@pytest.mark.parametrize("command", ["build", "examples"])
+@pytest.mark.parametrize("within", [False, True])
+def test_a_pipe_in_the_place_of_a_photo(
+    command: str, within: bool, mien: Mien, tmp_path: Path
+) -> None:
+    (tmp_path / "photos").mkdir()
+    os.mkfifo(tmp_path / "photos" / "a.jpg")
+    source = tmp_path / "photos" if within else tmp_path / "photos" / "a.jpg"
+    error = mien(command, source, "-o", tmp_path / "out").error
+    assert error.startswith(f"{tmp_path / 'photos' / 'a.jpg'}: expected a photo")
+    assert error.endswith("got a named pipe")
+
+
+def test_postscript_in_the_place_of_a_photo(bare_james: Path, mien: Mien, tmp_path: Path) -> None:
+    (bare_james / "left.png").write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n{ } loop\n")
+    error = mien("build", bare_james, "-o", tmp_path / "head").error
+    expected = "expected an image (JPEG, PNG, HEIC, ...), found something else (PostScript)"
+    assert error == f"{bare_james / 'left.png'}: {expected}"
+
+
+@pytest.mark.parametrize("place", ["textures/atlas.png", "regions/left_mouth.png"])
+@pytest.mark.parametrize("what", ["postscript", "pipe"])
+def test_a_picture_of_a_head_that_is_none(
+    place: str, what: str, built: Built, mien: Mien, tmp_path: Path
+) -> None:
+    head = shutil.copytree(built.folder, tmp_path / "head")
+    (head / place).unlink()
+    if what == "postscript":
+        (head / place).write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n{ } loop\n")
+    elif hasattr(os, "mkfifo"):
+        os.mkfifo(head / place)
+    else:
+        pytest.skip("no named pipes on this system")
+    found = "something else (PostScript)" if what == "postscript" else "a named pipe"
+    error = mien("render", head, "-o", tmp_path / "x.png").error
+    assert error.startswith(f"{head / place}: expected an image")
+    assert error.endswith(f"found {found}")
 
 
 @FACES

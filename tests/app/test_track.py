@@ -93,6 +93,7 @@ def tracker(monkeypatch: pytest.MonkeyPatch) -> type[BrightnessTracker]:
 
     monkeypatch.setattr(ReadyHead, "tracker", Fresh)
     monkeypatch.setattr(mien.app.track, "LandmarkDetector", Nobody)
+    monkeypatch.setattr(mien.app.track, "turn_upright", lambda *rest: False)
     monkeypatch.setattr(mien.app.track, "find_focal", lambda *rest: (100.0, "of the lens"))
     return Fresh
 

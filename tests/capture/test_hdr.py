@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from PIL import Image
 
 from filmed import coded_hdr, hdr_written
 from mien.arrays import Array
 from mien.capture.hdr import HLG, KNEE, PQ, WHITE, to_srgb
+from mien.capture.photos import load_photo
 from mien.capture.video import Video
 
 BT709, BT2020 = 1, 9
@@ -55,8 +59,30 @@ def test_primaries_of_ordinary_video_stay() -> None:
 
 
 @pytest.mark.parametrize("transfer", [HLG, PQ])
+def test_a_photo(tmp_path: Path, transfer: int) -> None:
+    """A HEIC as cameras write it. Eight bits of PQ are some levels of sRGB apart."""
+    import pillow_heif
+
+    picture = np.repeat(np.repeat(SKIN[None] * 0.95, 64, axis=0), 64, axis=1)
+    codes = np.rint(255 * coded_hdr(picture, transfer)).astype(np.uint8)
+    pillow_heif.from_pillow(Image.fromarray(codes)).save(
+        tmp_path / "a.heic",
+        quality=100,
+        color_primaries=BT2020,
+        transfer_characteristics=transfer,
+        matrix_coefficients=9,
+        full_range_flag=1,
+    )
+    photo = load_photo(tmp_path / "a.heic")
+    found = photo.pixels[32, 32::64].astype(int)
+    assert np.abs(found - SKIN * 0.95).max() <= 8
+    name = {HLG: "HLG", PQ: "PQ"}[transfer]
+    assert photo.notes == (f"HDR photo ({name}): its colours are mapped to sRGB",)
+
+
+@pytest.mark.parametrize("transfer", [HLG, PQ])
 @pytest.mark.parametrize("stated", [True, False])
-def test_a_clip(tmp_path, transfer: int, stated: bool) -> None:  # type: ignore[no-untyped-def]
+def test_a_clip(tmp_path: Path, transfer: int, stated: bool) -> None:
     """Patches of skin and grey, 10 bits, as a phone films: within a few levels of what they are."""
     patches = np.vstack([SKIN * 0.95, [[g] * 3 for g in (0, 30, 64, 118, 180, 225)]])
     picture = np.repeat(np.repeat(patches[None], 48, axis=0), 32, axis=1)

@@ -20,7 +20,7 @@ NOTES = {
     0: [],
     1: ["its pictures lie on their side: they are turned by 90 degrees counterclockwise"],
     2: ["its pictures are upside-down: they are turned by 180 degrees"],
-    3: ["its pictures lie on their side: they are turned by -90 degrees counterclockwise"],
+    3: ["its pictures lie on their side: they are turned by 90 degrees clockwise"],
 }
 
 
@@ -45,6 +45,15 @@ def test_turned_until_the_head_is_upright(
     frame = next(video.frames())
     assert np.abs(frame.pixels().astype(int) - face).mean() < 4
     assert frame.size == (300, 400)
+
+
+@pytest.mark.parametrize("name", ["cap12_edit", "single_face", "d14"])
+@pytest.mark.parametrize("quarters", range(4))
+def test_real_clips(shared: Path, detector: LandmarkDetector, name: str, quarters: int) -> None:
+    """Lying as they are turned before: an upside-down face is not taken for another one."""
+    video = Video(shared / f"data/videos/{name}.mp4", quarters)
+    turn_upright(video, detector)
+    assert video.quarters == 0
 
 
 def test_what_the_file_says_comes_first(

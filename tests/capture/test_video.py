@@ -1,13 +1,15 @@
 from __future__ import annotations
 
 import wave
+from collections.abc import Callable
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 import pytest
 
-from filmed import broken, flagged, grey, written
+from filmed import broken, flagged, grey, shown_by, written
 from mien.arrays import Array
 from mien.capture.video import Video, VideoFacts
 from mien.errors import FileFormatError, InputError
@@ -84,6 +86,69 @@ def test_rotation_flag(tmp_path: Path, quarters: int) -> None:
         assert np.median(np.abs(pixels - expected[::step, ::step])) <= 4
     facts = video.facts()
     assert (facts.height, facts.width) == expected.shape[:2]
+
+
+@pytest.mark.parametrize(
+    ("matrix", "shown"),
+    [
+        ((-1, 0, 0, 1), lambda stored: stored[:, ::-1]),
+        ((1, 0, 0, -1), lambda stored: stored[::-1]),
+        ((0, 1, 1, 0), lambda stored: stored.transpose(1, 0, 2)),
+        ((0, -1, -1, 0), lambda stored: stored[::-1, ::-1].transpose(1, 0, 2)),
+    ],
+)
+def test_a_matrix_that_mirrors(
+    tmp_path: Path, matrix: tuple[int, int, int, int], shown: Callable[[Array], Array]
+) -> None:
+    stored = np.zeros((48, 64, 3), np.uint8)
+    stored[:24, :32], stored[:24, 32:], stored[24:, :32] = 230, 160, 80
+    video = Video(shown_by(written(tmp_path / "a.mp4", [stored] * 3), *matrix))
+    frame = next(video.frames())
+    expected = shown(stored).astype(int)
+    for max_side, step in ((None, 1), (32, 2)):
+        pixels = frame.pixels(max_side=max_side)
+        assert pixels.shape == expected[::step, ::step].shape
+        assert np.median(np.abs(pixels - expected[::step, ::step])) <= 4
+    facts = video.facts()
+    assert (facts.height, facts.width) == expected.shape[:2]
+
+
+@pytest.mark.parametrize(("name", "mirrored"), [("hflip.mp4", True), ("bottom_up.mp4", False)])
+def test_the_handed_mirrored_clips(shared: Path, name: str, mirrored: bool) -> None:
+    """Three seconds of a clip that is beside them: upright, one of both mirrored."""
+    original = list(Video(shared / "data/videos/cap13_edit2.mp4").frames())[:75:25]
+    frames = list(Video(shared / "data/cases/mirrored_clip" / name).frames())[::25]
+    for frame, other in zip(frames, original, strict=True):
+        expected = other.pixels()[:, ::-1] if mirrored else other.pixels()
+        assert np.abs(frame.pixels().astype(int) - expected).mean() < 6
+
+
+def test_pictures_stored_from_the_bottom_up(tmp_path: Path) -> None:
+    """Raw .avi files do, and no flag says so: their kind does."""
+    stored = np.zeros((48, 64, 3), np.uint8)
+    stored[:24], stored[24:, :32] = (200, 40, 90), 120
+    with av.open(str(tmp_path / "a.avi"), "w") as container:
+        stream = container.add_stream("rawvideo", rate=10)
+        stream.pix_fmt, stream.height, stream.width = "bgr24", 48, 64
+        frame = av.VideoFrame.from_ndarray(stored, format="rgb24")
+        container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    (frame,) = Video(tmp_path / "a.avi").frames()
+    np.testing.assert_array_equal(frame.pixels(), stored)
+
+
+def test_the_cover_of_a_song_is_no_video(tmp_path: Path) -> None:
+    kinds = pytest.importorskip("av.stream")
+    if not hasattr(kinds, "Disposition"):
+        pytest.skip("this PyAV does not tell covers")
+    with av.open(str(tmp_path / "a.m4a"), "w", format="mp4") as container:
+        cover = container.add_stream("png", rate=1)
+        cover.pix_fmt, cover.height, cover.width = "rgb24", 16, 16
+        cover.disposition = kinds.Disposition.attached_pic.value
+        container.mux(cover.encode(av.VideoFrame(16, 16, "rgb24")))
+        container.mux(cover.encode())
+    with pytest.raises(FileFormatError, match="expected a video, found no picture track"):
+        Video(tmp_path / "a.m4a").facts()
 
 
 def test_broken_half_way_keeps_what_was_decoded(tmp_path: Path, rng: np.random.Generator) -> None:

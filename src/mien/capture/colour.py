@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -65,3 +66,21 @@ def to_srgb(image: Image, profile: bytes | None, notes: list[str]) -> Image:
     elif image.mode == "CMYK":
         notes.append("CMYK without a colour profile: colours are approximate")
     return image if image.mode == "RGB" else image.convert("RGB")
+
+
+def from_hdr(image: Image, coded: Mapping[str, Any], notes: list[str]) -> Image:
+    """Mode RGB; a picture coded in PQ or HLG, as some cameras' HEICs are, in sRGB.
+
+    Args:
+        coded: what the container says of its colours, by the names of HEIF's `nclx` box.
+    """
+    from mien.capture import hdr
+
+    transfer = coded.get("transfer_characteristics")
+    if transfer not in hdr.HDR:
+        return image
+    from PIL import Image
+
+    notes.append(f"HDR photo ({hdr.HDR[transfer]}): its colours are mapped to sRGB")
+    codes = np.asarray(image).astype(np.uint16) * 257
+    return Image.fromarray(hdr.to_srgb(codes, transfer, coded.get("color_primaries", 0)))

@@ -122,7 +122,7 @@ def _shrunk_rgb(image: Image, max_side: int, notes: list[str]) -> Image:
     """
     from PIL import Image
 
-    from mien.capture.colour import to_eight_bits, to_srgb
+    from mien.capture.colour import from_hdr, to_eight_bits, to_srgb
 
     factor = min(1.0, max_side / max(image.size))
     target = max(1, round(image.width * factor)), max(1, round(image.height * factor))
@@ -132,11 +132,11 @@ def _shrunk_rgb(image: Image, max_side: int, notes: list[str]) -> Image:
     if getattr(image, "n_frames", 1) > 1 and image.format != "MPO":
         notes.append(f"holds {getattr(image, 'n_frames', 1)} pictures: the first is used")
     image.load()
-    profile = image.info.get("icc_profile")
+    profile, coded = image.info.get("icc_profile"), image.info.get("nclx_profile") or {}
     eight_bits = to_eight_bits(image, notes)
     if eight_bits.size != target and factor < 1:
         eight_bits = eight_bits.resize(target, Image.Resampling.LANCZOS, reducing_gap=2.0)
-    return to_srgb(eight_bits, profile, notes)
+    return from_hdr(to_srgb(eight_bits, profile, notes), {} if profile else coded, notes)
 
 
 def _turned(image: Image, turn: int) -> Image:

@@ -19,6 +19,11 @@ _LOOKS = 24
 _AGREE = 3
 """Frames that must show the head the same way up."""
 _SIDE = 640
+_HOW = {
+    1: "lie on their side: they are turned by 90 degrees counterclockwise",
+    2: "are upside-down: they are turned by 180 degrees",
+    3: "lie on their side: they are turned by 90 degrees clockwise",
+}
 _UP = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
 """Where up is, x right and y down, in pictures that so many turns counterclockwise make upright."""
 
@@ -29,13 +34,12 @@ def turn_upright(video: Video, detector: LandmarkDetector) -> bool:
     The first ten seconds are looked at, as closely as a photo, until three frames agree.
     Raises: as Video.frames.
     """
-    video.quarters = _quarters(video, detector)
-    if video.quarters:
-        how = {1: "lie on their side", 2: "are upside-down", 3: "lie on their side"}
-        degrees = {1: 90, 2: 180, 3: -90}[video.quarters]
-        turned = f"turned by {degrees} degrees" + " counterclockwise" * (degrees != 180)
-        video.notes.append(f"its pictures {how[video.quarters]}: they are {turned}")
-    return video.quarters != 0
+    quarters = _quarters(video, detector)
+    if not quarters:
+        return False
+    video.quarters = (video.quarters + quarters) % 4
+    video.notes.append(f"its pictures {_HOW[quarters]}")
+    return True
 
 
 def _quarters(video: Video, detector: LandmarkDetector) -> int:

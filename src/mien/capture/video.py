@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mien.arrays import Array, UInt8
+from mien.arrays import Array, UInt8, UInt16
 from mien.capture.display import Display, display_of
 from mien.capture.files import check_readable, kind_of, one_line
 from mien.capture.hdr import HDR, to_srgb
@@ -20,6 +20,7 @@ from mien.errors import FileFormatError
 if TYPE_CHECKING:
     from av import VideoFrame
     from av.container import InputContainer
+    from av.video.plane import VideoPlane
     from av.video.stream import VideoStream
 
 CONTAINERS = (
@@ -52,6 +53,7 @@ would open, or single pictures."""
 
 _OPTIONS = {"format_whitelist": ",".join(CONTAINERS), "protocol_whitelist": "file"}
 _USUAL_RATE = 25
+_ATTACHED_PICTURE = 0x400  # FFmpeg's AV_DISPOSITION_ATTACHED_PIC
 _UNSPECIFIED, _BT2020 = 2, 9  # Codes of matrix coefficients
 _PER_SECOND = 1e6  # FFmpeg's unit of a container's times
 
@@ -97,13 +99,7 @@ class Frame:
         # The scaler's quickest way, "FAST_BILINEAR", shifts pictures by most of a pixel.
         how = "AREA" if height < self.raw.height else "BILINEAR"
         if self.hdr:
-            codes = self.raw.to_ndarray(
-                format="rgb48le",
-                width=width,
-                height=height,
-                interpolation=how,
-                src_colorspace=_hdr_matrix(self.raw.colorspace),
-            )
+            codes = _sixteen_bits(self.raw, width, height, how)
             stored = to_srgb(codes, self.raw.color_trc, self.raw.color_primaries)
         else:
             stored = self.raw.to_ndarray(
@@ -223,10 +219,13 @@ def _open(path: Path) -> InputContainer:
 
 def _pictures(container: InputContainer) -> VideoStream | None:
     """The first track of pictures that is not the cover of a piece of music."""
-    from av.stream import Disposition
+    return next((stream for stream in container.streams.video if not _is_cover(stream)), None)
 
-    streams = container.streams.video
-    return next((s for s in streams if not s.disposition & Disposition.attached_pic), None)
+
+def _is_cover(stream: VideoStream) -> bool:
+    # Early versions of PyAV 14 do not tell.
+    disposition = getattr(stream, "disposition", None)
+    return disposition is not None and bool(disposition.value & _ATTACHED_PICTURE)
 
 
 def _decoded(container: InputContainer, stream: VideoStream, quarters: int) -> Iterator[Frame]:
@@ -243,9 +242,20 @@ def _decoded(container: InputContainer, stream: VideoStream, quarters: int) -> I
         yield Frame(count, seconds, size, display, raw)
 
 
-def _hdr_matrix(colorspace: int) -> int:
-    """What HDR pictures are coded with where the file does not say."""
-    return _BT2020 if colorspace == _UNSPECIFIED else colorspace
+def _sixteen_bits(raw: VideoFrame, width: int, height: int, how: str) -> UInt16[Array, "h w 3"]:
+    """R'G'B' of an HDR picture over the full range."""
+    # BT.2020's is what such a picture is coded with where the file does not say.
+    matrix = _BT2020 if raw.colorspace == _UNSPECIFIED else raw.colorspace
+    # Planes, as FFmpeg 8.0 spoils pictures whose 16 bits are not in planes.
+    shown = raw.reformat(width, height, "gbrp16le", src_colorspace=matrix, interpolation=how)
+    green, blue, red = (_values(plane) for plane in shown.planes)
+    return np.stack([red, green, blue], axis=-1)
+
+
+def _values(plane: VideoPlane) -> UInt16[Array, "h w"]:
+    rows = np.frombuffer(memoryview(plane), "<u2").reshape(plane.height, plane.line_size // 2)
+    values: Array = rows[:, : plane.width].astype(np.uint16, copy=False)
+    return values
 
 
 def _rate(stream: VideoStream) -> float:

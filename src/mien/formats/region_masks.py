@@ -41,7 +41,7 @@ def read_masks(folder: Path, mesh: Mesh) -> dict[str, Float[Array, " v"]]:
     """
     files = {name: folder / FOLDER / f"{name}.png" for name in MASKS}
     return {
-        name: _at_vertices(mesh, load_image(file)) for name, file in files.items() if file.is_file()
+        name: _at_vertices(mesh, load_image(file)) for name, file in files.items() if file.exists()
     }
 
 
