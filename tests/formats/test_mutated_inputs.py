@@ -180,6 +180,6 @@ def test_a_thousand_damaged_inputs_are_told_in_one_line(
             told[f"{name} read"] += 1
         assert time.perf_counter() - start < SECONDS, done
         shutil.rmtree(folder)
-    print(told)
+
     assert all(told[name] for name in readers), told
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 < BYTES
