@@ -92,7 +92,7 @@ def test_other_kinds_of_numbers_are_refused(path: Path, array: np.ndarray, probl
         geometries(path)
 
 
-@pytest.mark.parametrize("kind", ["u1", "i2", "f4", "f8", ">i4"])
+@pytest.mark.parametrize("kind", ["u1", "i2", "f2", "f4", "f8", ">i4"])
 def test_whole_numbers_of_any_kind_are_the_same(path: Path, kind: str) -> None:
     np.savez(path, triangles=np.arange(12).reshape(4, 3).astype(kind))
     with ArrayFile(path) as arrays:

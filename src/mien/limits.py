@@ -36,9 +36,11 @@ MAX_DEPTH = 64
 MAX_CONTAINERS = 4_000_000
 """Lists and objects in a JSON document altogether."""
 MAX_JSON_BYTES = 64 * MIB
-"""Of a JSON document, and of a line of a journal."""
+"""Of a JSON document."""
 MAX_TABLE_BYTES = 256 * MIB
 """Of a track's or a recording's .csv, and of a journal."""
+MAX_LINE = MIB
+"""Letters of a line in one of these."""
 MAX_POINTS_BYTES = 4 * MIB
 """Of a .tem or .pts."""
 

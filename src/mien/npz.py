@@ -141,6 +141,9 @@ class ArrayFile:
             problem = f"not a readable .npz file ({_said(error)})"
             raise FileFormatError(self.path, problem, name) from None
         array: Array = np.frombuffer(data, dtype)
+        if dtype.kind == "f" and dtype.itemsize < 4:
+            # The limits that numbers are compared with are beyond those of half precision.
+            array = array.astype(np.float64)
         return array.reshape(found[::-1]).T if transposed else array.reshape(found)
 
     def _count(self, name: str, size: int, stored: int) -> None:

@@ -243,6 +243,7 @@ def test_a_photo_of_another_size(folder: Path) -> None:
             r"expected shape \(any, 134, 2\), found \(4, 68, 2\)",
         ),
         ({"geometries": np.full((4, 134, 2), np.nan)}, "geometries: expected finite numbers"),
+        ({"geometries": np.zeros((4, 134, 2))}, r"geometries\[0\]: expected points of a face, f"),
         ({"geometries": np.zeros((0, 134, 2))}, "geometries: expected at least one"),
     ],
 )

@@ -469,6 +469,14 @@ def test_textures_that_are_mixed_are_of_one_size(saved: Path) -> None:
     assert str(caught.value) == f"{path}: expected 64x32 px as neutral's texture, found 256x256"
 
 
+def test_neutral_has_a_texture(saved: Path) -> None:
+    edit_json(saved, put("textures", to={}))
+    with pytest.raises(FileFormatError) as caught:
+        load_head(saved)
+    problem = "expressions.neutral.texture: expected one of the textures, found 'atlas' of none"
+    assert str(caught.value) == f"{saved / 'head.json'}: {problem}"
+
+
 def test_a_head_of_the_generic_topology_has_the_generic_names(
     generic: Head, tmp_path: Path
 ) -> None:

@@ -80,6 +80,17 @@ def test_angles_have_the_apps_signs(tmp_path: Path) -> None:
     assert row["BlendShapeCount"] == "61"
 
 
+def test_what_is_written_can_be_read(tmp_path: Path) -> None:
+    """Eyes that look farther than any, and expressions whose units add up."""
+    tracks = {"gaze.yaw": constant(1.2), "units.eyeLookOutLeft": constant(1.0)}
+    units = {"jawOpen": 1.9, "mouthPucker": -0.8}
+    write_live_link(
+        tmp_path / "a.csv", moments(Timeline(0.1, tracks=tracks)), units_of=lambda state: units
+    )
+    found = load_live_link(tmp_path / "a.csv").at(0).state.units
+    assert (found["jawOpen"], found["mouthPucker"], found["eyeLookOutLeft"]) == (1.5, -0.5, 1.5)
+
+
 def test_head_angles_are_unreals(tmp_path: Path) -> None:
     path = recording(tmp_path, HeadYaw="-0.4", HeadPitch="0.3", HeadRoll="-0.2")
     found = load_live_link(path).at(0).rotation

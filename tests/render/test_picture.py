@@ -196,3 +196,8 @@ def test_a_turntable_goes_once_around(head: Head, used: list[Camera]) -> None:
     turned = np.degrees(np.unwrap(azimuth))
     np.testing.assert_allclose(turned - turned[0], [0, 90, 180, 270], atol=1e-6)
     assert turned[0] == pytest.approx(0, abs=1e-6)
+
+
+def test_a_picture_that_is_too_large_is_refused_before_it_is_made(head: Head) -> None:
+    with pytest.raises(InputError, match="size: expected at most 8192 px a side, got 9000x10"):
+        render_head(head, size=(9000, 10))

@@ -6,9 +6,10 @@ import csv
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TextIO
 
 from mien.errors import FileFormatError, InputError
-from mien.limits import LARGEST, MAX_TABLE_BYTES
+from mien.limits import LARGEST, MAX_LINE, MAX_TABLE_BYTES
 from mien.reading import check_file
 
 
@@ -29,7 +30,7 @@ def read_rows(
             first = next((line for line in stream if line.strip()), "")
             stream.seek(0)
             separator = max(separators, key=first.count)
-            reader = csv.reader(stream, delimiter=separator, strict=True)
+            reader = csv.reader(_lines(path, stream), delimiter=separator, strict=True)
             for row in reader:
                 if any(cell.strip() for cell in row):
                     count += 1
@@ -40,6 +41,15 @@ def read_rows(
         raise FileFormatError(path, f"expected {expected}, found other bytes") from None
     if not count:
         raise FileFormatError(path, f"expected {expected}, found an empty file")
+
+
+def _lines(path: Path, stream: TextIO) -> Iterator[str]:
+    """Raises: FileFormatError: one that is too long; a million empty cells take much memory."""
+    for number, line in enumerate(stream, 1):
+        if len(line) > MAX_LINE:
+            problem = f"expected lines of at most {MAX_LINE} letters, found {len(line)}"
+            raise FileFormatError(path, problem, f"line {number}")
+        yield line
 
 
 def finite_number(path: str | Path, text: str, place: str) -> float:

@@ -48,6 +48,9 @@ __all__ = [
 
 INDEX, SUBREGIONS = "examples.json", "subregions.npz"
 
+_LEAST_PX = 0.01
+"""Width and height of a face's points, at least."""
+
 _PAIR = re.compile(r"\[\n\s*([-+\d.e]+),\n\s*([-+\d.e]+)\n\s*\]")
 """Two numbers, one a line: a place, which reads better in one line."""
 
@@ -208,6 +211,10 @@ def _statistics(path: Path, layout: FeatureLayout) -> Float[Array, "N n 2"]:
         geometries = arrays.numbers("geometries", (None, len(layout.names), 2))
     if not len(geometries):
         raise FileFormatError(path, "expected at least one picture's points", "geometries")
+    flat = np.flatnonzero(np.ptp(geometries, axis=1).min(axis=1) < _LEAST_PX)
+    if len(flat):
+        problem = "expected points of a face, found all on one line or in one place"
+        raise FileFormatError(path, problem, f"geometries[{flat[0]}]")
     return geometries
 
 

@@ -174,8 +174,15 @@ def _check_textures(
     textures: Mapping[str, UInt8[Array, "h w 3"]],
     shapes: Mapping[str, Expression],
 ) -> None:
-    """Those that are mixed must be of one size. Raises: FileFormatError: names the file."""
+    """Those that are mixed must be of one size, neutral's among them.
+
+    Raises: FileFormatError: names the file. Broken: neutral has none.
+    """
     neutral = textures.get(shapes[NEUTRAL].texture)
+    if neutral is None:
+        known = ", ".join(textures)[:60] or "none"
+        problem = f"expected one of the textures, found {shapes[NEUTRAL].texture[:60]!r} of {known}"
+        raise Broken(f"expressions.{NEUTRAL}.texture", problem)
     for name, pixels in textures.items():
         largest = max(pixels.shape[:2])
         if largest > MAX_SIDE:
@@ -183,7 +190,7 @@ def _check_textures(
             raise FileFormatError(folder / files[name], problem)
     for shape in shapes.values():
         own = textures.get(shape.texture)
-        if neutral is not None and own is not None and own.shape != neutral.shape:
+        if own is not None and own.shape != neutral.shape:
             expected, found = (f"{p.shape[1]}x{p.shape[0]}" for p in (neutral, own))
             problem = f"expected {expected} px as neutral's texture, found {found}"
             raise FileFormatError(folder / files[shape.texture], problem)

@@ -20,6 +20,7 @@ from mien.arrays import Array
 from mien.errors import InputError
 from mien.expressions.state import FaceState
 from mien.formats.atomic import atomic_file
+from mien.limits import UNIT_RANGE
 
 # The order of the app's columns.
 UNITS = (
@@ -114,15 +115,18 @@ def values_of(moment: Moment, given: Mapping[str, float]) -> dict[str, float]:
 def unit_weights(state: FaceState, given: Mapping[str, float]) -> dict[str, float]:
     """All 52 UNITS: the given ones, and where the eyes look added to the EyeLook units.
 
+    What goes beyond UNIT_RANGE so, which readers refuse, stays at its end.
+
     Raises: InputError: a unit that is none of them.
     """
     for name in given:
         if name not in UNITS:
             raise InputError("unit", "one of the 52 that Live Link Face has columns for", name)
-    weights = {name: float(given.get(name, 0.0)) for name in UNITS}
-    for name, share in _looks(state).items():
-        weights[name] += share
-    return weights
+    looks, (low, high) = _looks(state), UNIT_RANGE
+    return {
+        name: min(max(float(given.get(name, 0.0)) + looks.get(name, 0.0), low), high)
+        for name in UNITS
+    }
 
 
 def _row(moment: Moment, given: Mapping[str, float]) -> list[str]:

@@ -46,33 +46,66 @@ def performance(
     Raises: InputError: no moment, times that do not ascend, a tolerance of 0 or less.
     """
     offsets = target_offsets(head)
-    played, weights = [], []
     shapes = _Shapes(check_positive("tolerance_mm", tolerance_mm), head.mesh.vertices.shape)
+    rows = _Rows()
     for batch in _batches(moments):
-        rows = [_named_weights(head, moment.state) for moment in batch]
+        named = [_named_weights(head, moment.state) for moment in batch]
         moved = [evaluate(moment.state).vertices - head.mesh.vertices for moment in batch]
-        for row, missed in zip(rows, moved, strict=True):
+        for row, missed in zip(named, moved, strict=True):
             for target, weight in row.items():
                 missed -= weight * offsets[target]
         shapes.cover(np.stack(moved))
-        played += batch
-        weights += rows
-    if not played:
+        rows.add(batch, named)
+    if not rows.times:
         raise InputError("moments", "at least one", "none")
-    names = tuple(dict.fromkeys(target for row in weights for target in row))
-    named = np.array([[row.get(target, 0.0) for target in names] for row in weights])
-    rotations, translations = _head_motion(played)
     motion, moving = shapes.result()
     further = {f"{MOTION}_{index}": shape for index, shape in enumerate(moving, 1)}
+    rotations, translations = rows.head_motion()
     return HeadAnimation(
-        times=np.array([moment.time for moment in played]),
-        target_names=(*names, *further),
-        weights=np.column_stack([named.reshape(len(played), -1), motion]),
+        times=np.concatenate(rows.times),
+        target_names=(*rows.names, *further),
+        weights=np.column_stack([rows.weights(), motion]),
         rotations=rotations,
         translations_mm=translations,
         shapes=further,
         name=name,
     )
+
+
+class _Rows:
+    """Times, weights by target and head motion of what has been played, as arrays."""
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+        self.times: list[Array] = []
+        self._weights: list[Array] = []
+        self._rotations: list[Array] = []
+        self._translations: list[Array] = []
+
+    def add(self, batch: list[Moment], named: list[dict[str, float]]) -> None:
+        known = set(self.names)
+        self.names += [t for t in dict.fromkeys(t for row in named for t in row) if t not in known]
+        weights = [[row.get(target, 0.0) for target in self.names] for row in named]
+        self._weights.append(np.array(weights).reshape(len(batch), -1))
+        self.times.append(np.array([moment.time for moment in batch]))
+        self._rotations.append(np.stack([moment.rotation for moment in batch]))
+        self._translations.append(np.stack([moment.translation for moment in batch]))
+
+    def weights(self) -> Float[Array, "t k"]:
+        """Targets that came later are at 0 before."""
+        missing = [len(self.names) - rows.shape[1] for rows in self._weights]
+        padded = [
+            np.pad(rows, ((0, 0), (0, more)))
+            for rows, more in zip(self._weights, missing, strict=True)
+        ]
+        return np.concatenate(padded)
+
+    def head_motion(self) -> tuple[Float[Array, "t 3 3"] | None, Float[Array, "t 3"] | None]:
+        """Rotations and translations; None for a head that does not turn or does not move."""
+        rotations = np.concatenate(self._rotations)
+        translations = np.concatenate(self._translations)
+        turns = not np.array_equal(rotations, np.broadcast_to(np.eye(3), rotations.shape))
+        return rotations if turns else None, translations if translations.any() else None
 
 
 def _named_weights(head: Head, state: FaceState) -> dict[str, float]:
@@ -119,13 +152,3 @@ def _batches(moments: Iterable[Moment]) -> Iterator[list[Moment]]:
     iterator = iter(moments)
     while batch := list(islice(iterator, _BATCH)):
         yield batch
-
-
-def _head_motion(
-    moments: list[Moment],
-) -> tuple[Float[Array, "t 3 3"] | None, Float[Array, "t 3"] | None]:
-    """Rotations and translations; None for a head that does not turn or does not move."""
-    rotations = np.stack([moment.rotation for moment in moments])
-    translations = np.stack([moment.translation for moment in moments])
-    turns = not np.array_equal(rotations, np.broadcast_to(np.eye(3), rotations.shape))
-    return rotations if turns else None, translations if translations.any() else None

@@ -20,7 +20,7 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.errors import Broken, FileFormatError, InputError
 from mien.formats.atomic import atomic_file
-from mien.limits import MAX_TABLE_BYTES
+from mien.limits import MAX_LINE, MAX_TABLE_BYTES
 from mien.reading import check_file
 from mien.strict_json import (
     as_choice,
@@ -159,7 +159,10 @@ def _whole_lines(file: BinaryIO) -> Iterator[bytes]:
 
 
 def _parsed(path: Path, number: int, line: bytes, expected: str) -> Json:
-    """Raises: FileFormatError: no object."""
+    """Raises: FileFormatError: no object, too long."""
+    if len(line) > MAX_LINE:
+        problem = f"expected lines of at most {MAX_LINE} letters, found {len(line)}"
+        raise FileFormatError(path, problem, f"line {number}")
     try:
         data = parse_json(path, line.decode("utf-8"), line=number)
     except UnicodeDecodeError:

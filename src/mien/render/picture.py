@@ -10,8 +10,10 @@ import numpy as np
 
 from mien.arrays import Array, UInt8
 from mien.camera import Camera
+from mien.errors import InputError
 from mien.expressions.rig import Rig
 from mien.expressions.state import FACE, FaceState, PosedFace
+from mien.limits import MAX_SIDE
 from mien.model.head import Head
 from mien.render.morph import MorphRenderer
 from mien.render.orbit import orbit_camera, turntable
@@ -93,7 +95,8 @@ def render_head(
             the state says which expressions to mix, the expression that it belongs to.
         state: what the face does; nothing by default.
         background: sRGB; transparent unless given.
-    Raises: InputError: no such photo, region, expression or unit; weights outside [-0.5, 1.5].
+    Raises: InputError: no such photo, region, expression or unit; weights outside [-0.5, 1.5]; a
+        picture of more than MAX_SIDE px a side.
     """
     renderer = head if isinstance(head, HeadRenderer) else HeadRenderer(head)
     state = state or FaceState()
@@ -104,6 +107,9 @@ def render_head(
         if not state.expressions:
             shown = {FACE: {_expression_of(renderer.head, photo): 1.0}}
             state = replace(state, expressions=shown)
+    if max(camera.width, camera.height) > MAX_SIDE:
+        found = f"{camera.width}x{camera.height}"
+        raise InputError(photo or "size", f"at most {MAX_SIDE} px a side", found)
     return renderer.draw(state, camera, background=background)
 
 
