@@ -9,8 +9,10 @@ import pytest
 from clips import scored
 from filmed import grey, written
 from mien.arrays import Array
-from mien.capture.detector import LandmarkDetector
+from mien.capture.detector import LandmarkDetector, NoFaceError
+from mien.capture.landmarks import Landmarks
 from mien.capture.mediapipe_face import LOWER_LIP, UPPER_LIP, DetectedFace
+from mien.capture.photos import Photo
 from mien.capture.picked_frames import pick_frames
 from mien.errors import EstimationError, InputError
 
@@ -51,13 +53,16 @@ PLAYED = {40: scored(), 80: scored(mouthSmile=0.9), 120: scored(jawOpen=0.7)}
 class Audience:
     """A detector that sees the actor in them."""
 
-    def detect_fast(self, pixels: Array) -> DetectedFace | None:
+    def all_fast(self, pixels: Array) -> list[DetectedFace]:
         level = 40 * round(pixels.mean() / 40)
         if level not in PLAYED:
-            return None
+            return []
         points = np.random.default_rng(0).uniform(0, 48, size=(478, 3))
         points[UPPER_LIP] = points[LOWER_LIP]
-        return DetectedFace(points, PLAYED[level], np.diag([1.0, -1.0, -1.0]))
+        return [DetectedFace(points, PLAYED[level], np.diag([1.0, -1.0, -1.0]))]
+
+    def detect(self, photo: Photo) -> Landmarks:
+        raise NoFaceError(photo.name)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8
+from mien.capture.clip_notes import ClipNotes
 from mien.capture.detector import LandmarkDetector, closer
 from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
 from mien.capture.frame_choice import FrameScores
@@ -128,15 +129,17 @@ class _Gathered:
         self.rows: list[tuple[int, float, DetectedFace]] = []
         self.left_out: dict[str, str] = {}
         self.notes: list[str] = []
+        self.standing: list[str] = []
 
     def read_video(self, detector: LandmarkDetector, report: Report | None) -> None:
         """Every frame, looked at once."""
         self.is_video = True
         video = Video(self.source)
-        total = video.facts().frames
+        total, odd = video.facts().frames, ClipNotes(detector)
         with frames_ahead(video, max_side=self.max_side) as pictures:
             for picture in pictures:
                 faces = detector.all_fast(picture.pixels)
+                odd.look(picture.pixels, faces)
                 if not faces:
                     self.left_out[frame_name(picture.frame)] = "no face found"
                 else:
@@ -145,7 +148,8 @@ class _Gathered:
                     self._add(frame_name(picture.frame), picture.frame, picture.pixels, found)
                 if report is not None:
                     report(picture.frame + 1, max(total, picture.frame + 1))
-        self.notes += [f"{self.source.name}: {note}" for note in video.notes]
+        self.notes += [f"{self.source.name}: {note}" for note in (*video.notes, *odd.notes)]
+        self.standing = odd.standing
 
     def read_photos(
         self, detector: LandmarkDetector, face: int | None, report: Report | None
@@ -194,7 +198,8 @@ class _Gathered:
         if not self.rows:
             what = "frames" if self.is_video else "photos"
             reasons = [f"{name}: {reason}" for name, reason in self.left_out.items()]
-            shown = "" if self.is_video else f" ({'; '.join(reasons[:3])})"
+            why = self.standing if self.is_video else reasons[:3]
+            shown = f" ({'; '.join(why)})" if why else ""
             raise EstimationError(f"{self.source}: no face found in any of its {what}{shown}")
         return FaceSeries(
             self.source,
