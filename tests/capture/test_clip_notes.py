@@ -93,7 +93,5 @@ def test_said_of_a_video_in_which_no_face_is_found_for_it(
     monkeypatch.setattr(detector, "all_fast", lambda pixels: seen(pixels)[1:])
     with monkeypatch.context() as patch:
         patch.setattr(ClipNotes, "_look_closely", lambda odd, pixels: odd._standing.update([2]))
-        with pytest.raises(
-            EstimationError, match="no face found in any of its frames.*on its head"
-        ):
+        with pytest.raises(EstimationError, match=r"no face found in any .*on its head"):
             command(clip, **asked)

@@ -112,6 +112,7 @@ class Tracker:
         """Go on as if these frames had been tracked."""
         self._past = list(frames[-2:])
         self._errors = [item.rms for item in frames if item.state is not None]
+        self.met_others = False
 
     def step(
         self,
