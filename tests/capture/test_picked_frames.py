@@ -9,10 +9,8 @@ import pytest
 from clips import scored
 from filmed import grey, written
 from mien.arrays import Array
-from mien.capture.detector import LandmarkDetector, NoFaceError
-from mien.capture.landmarks import Landmarks
+from mien.capture.detector import LandmarkDetector
 from mien.capture.mediapipe_face import LOWER_LIP, UPPER_LIP, DetectedFace
-from mien.capture.photos import Photo
 from mien.capture.picked_frames import pick_frames
 from mien.errors import EstimationError, InputError
 
@@ -60,9 +58,6 @@ class Audience:
         points = np.random.default_rng(0).uniform(0, 48, size=(478, 3))
         points[UPPER_LIP] = points[LOWER_LIP]
         return [DetectedFace(points, PLAYED[level], np.diag([1.0, -1.0, -1.0]))]
-
-    def detect(self, photo: Photo) -> Landmarks:
-        raise NoFaceError(photo.name)
 
 
 @pytest.mark.parametrize(

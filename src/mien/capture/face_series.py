@@ -129,13 +129,12 @@ class _Gathered:
         self.rows: list[tuple[int, float, DetectedFace]] = []
         self.left_out: dict[str, str] = {}
         self.notes: list[str] = []
-        self.standing: list[str] = []
 
     def read_video(self, detector: LandmarkDetector, report: Report | None) -> None:
         """Every frame, looked at once."""
         self.is_video = True
         video = Video(self.source)
-        total, odd = video.facts().frames, ClipNotes(detector)
+        total, odd = video.facts().frames, ClipNotes()
         with frames_ahead(video, max_side=self.max_side) as pictures:
             for picture in pictures:
                 faces = detector.all_fast(picture.pixels)
@@ -149,7 +148,6 @@ class _Gathered:
                 if report is not None:
                     report(picture.frame + 1, max(total, picture.frame + 1))
         self.notes += [f"{self.source.name}: {note}" for note in (*video.notes, *odd.notes)]
-        self.standing = odd.standing
 
     def read_photos(
         self, detector: LandmarkDetector, face: int | None, report: Report | None
@@ -198,8 +196,7 @@ class _Gathered:
         if not self.rows:
             what = "frames" if self.is_video else "photos"
             reasons = [f"{name}: {reason}" for name, reason in self.left_out.items()]
-            why = self.standing if self.is_video else reasons[:3]
-            shown = f" ({'; '.join(why)})" if why else ""
+            shown = "" if self.is_video else f" ({'; '.join(reasons[:3])})"
             raise EstimationError(f"{self.source}: no face found in any of its {what}{shown}")
         return FaceSeries(
             self.source,

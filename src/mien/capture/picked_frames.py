@@ -117,7 +117,7 @@ def _judge(
     """Scores of the frames, evenly spread in time, that show a face."""
     step = max(_SAMPLE_SECONDS, (video.facts().seconds or 0) / MAX_SAMPLES)
     rows: list[tuple[int, float, DetectedFace]] = []
-    odd = ClipNotes(detector)
+    odd = ClipNotes()
     due = -np.inf
     for frame in video.frames():
         report(0, frame.index)
@@ -133,7 +133,6 @@ def _judge(
             points = faces[0].points[:, :2] * (max(pixels.shape) / max(small.shape))
             rows.append((frame.index, face_sharpness(pixels, points), faces[0]))
     if not rows:
-        problem = "; ".join(["no face found in any of its frames", *odd.standing])
-        raise EstimationError(f"{video.path}: {problem}")
+        raise EstimationError(f"{video.path}: no face found in any of its frames")
     video.notes += odd.notes
     return FrameScores.of(*zip(*rows, strict=True))
