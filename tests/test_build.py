@@ -131,7 +131,7 @@ def test_an_expression_that_does_not_fit_is_named_in_the_notes(calls: SimpleName
 
 def test_without_neutral(calls: SimpleNamespace) -> None:
     calls.capture = Capture("Ann", {"joy": (view("a.png", 0),)})
-    with pytest.raises(EstimationError, match="photos: there is no folder called neutral"):
+    with pytest.raises(EstimationError, match="photos: no photo in neutral shows a face"):
         build_head("photos", options=OPTIONS)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.capture.annotations import save_annotations
+from mien.capture.folder import photo_files
 from mien.capture.source import Capture, load_capture
 from mien.errors import EstimationError
 from mien.expressions.closing import meet_lips
@@ -106,6 +107,7 @@ def build_head(
     """
     options = options or BuildOptions()
     tell = progress or (lambda stage, done, total: None)
+    _check_neutral(Path(source))
     generic = load_generic_head()
     capture = load_capture(
         source,
@@ -116,11 +118,17 @@ def build_head(
     )
     capture = _named_by_expression(capture)
     if NEUTRAL not in capture.expressions:
-        raise EstimationError(f"{source}: there is no folder called {NEUTRAL} among its folders")
+        raise EstimationError(f"{source}: no photo in {NEUTRAL} shows a face that can be used")
     capture, fits, units = _fit_all(capture, generic, options, tell)
     head = _head(capture, fits, units, generic)
     head, coverage = _with_textures(head, capture, options, tell)
     return Build(head, capture, fits, coverage)
+
+
+def _check_neutral(source: Path) -> None:
+    """Refuse folders of expressions without one for the face at rest, before any work is done."""
+    if source.is_dir() and NEUTRAL not in photo_files(source):
+        raise EstimationError(f"{source}: there is no folder called {NEUTRAL} among its folders")
 
 
 def _fit_all(

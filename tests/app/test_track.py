@@ -19,7 +19,7 @@ from mien.app.ready_head import ReadyHead
 from mien.app.track import COUNTED, STARTED_OVER, Tracked, track_video
 from mien.app.track_files import TrackFiles
 from mien.arrays import Array
-from mien.errors import FileFormatError, InputError, MienError
+from mien.errors import EstimationError, FileFormatError, InputError, MienError
 from mien.formats.track_csv import load_track
 from mien.formats.track_journal import journal_of
 from mien.track.state import Layout, Status, TrackedFrame, TrackState
@@ -36,6 +36,7 @@ class BrightnessTracker:
     layout = LAYOUT
     stops_at: int | None = None
     made = 0
+    met_others = False
 
     def __init__(self, *arguments: object, **options: object) -> None:
         type(self).made += 1
@@ -56,7 +57,7 @@ class BrightnessTracker:
             time=time,
             status=status,
             state=None if status == "lost" else self._state(level / 255),
-            rms=level if level >= BLACK else np.nan,
+            rms=level / 20 if level >= BLACK else np.nan,
             seen=1.0,
             deviations=np.full(len(LAYOUT.channels), 0.1),
             gain=np.ones(3),
@@ -124,7 +125,7 @@ def test_a_table_of_all_frames(clip: Path, tmp_path: Path) -> None:
     assert (tracked.frames, tracked.resumed, tracked.focal_px) == (12, 0, 100)
     assert tracked.fps is not None
     assert tracked.fps > 0
-    assert tracked.rms == pytest.approx(130, abs=3)
+    assert tracked.rms == pytest.approx(6.5, abs=0.15)
     assert tracked.notes == ("of the lens", "the face is lost in 2 of 12 frames, at 0.50 s first")
     assert told == [("Tracking", done, 12) for done in range(13)]
     found = load_track(tmp_path / "t.csv")
@@ -274,13 +275,12 @@ def test_one_frame(tmp_path: Path) -> None:
 
 def test_nobody_there(tmp_path: Path) -> None:
     files = everything(tmp_path)
-    tracked = track_video(written(tmp_path / "a.mp4", grey([5] * 4)), head(), files)
-    assert tracked.counts == {"ok": 0, "reacquired": 0, "lost": 4}
-    assert tracked.rms is None
-    assert tracked.notes[1:] == (
-        "the face is lost in 4 of 4 frames, at 0.00 s first",
-        f"{tmp_path / 'l.csv'}: not written: no frame shows the face",
-    )
+    clip = written(tmp_path / "a.mp4", grey([5] * 4))
+    told = f"{clip}: expected the head's face, found in none of 4 frames: no face was there; "
+    with pytest.raises(EstimationError) as caught:
+        track_video(clip, head(), files)
+    assert str(caught.value) == f"{told}{files.table} says so of each"
+    assert not journal_of(files.table).exists()
     assert [frame.state for frame in load_track(files.table).frames] == [None] * 4
     assert (tmp_path / "o.mp4").exists()
     assert not (tmp_path / "l.csv").exists()

@@ -17,7 +17,8 @@ from mien.app.track_files import TrackFiles
 from mien.app.track_run import digest, mean_rate
 from mien.arrays import Array
 from mien.camera import Camera
-from mien.errors import FileFormatError
+from mien.capture.video import Video
+from mien.errors import EstimationError, FileFormatError
 from mien.expressions.state import FaceState
 from mien.formats.head_folder import load_head
 from mien.formats.track_csv import load_track
@@ -172,3 +173,72 @@ def test_mean_rate(times: list[float], rate: float) -> None:
         for number, time in enumerate(times)
     ]
     assert mean_rate(frames, 25) == pytest.approx(rate)
+
+
+COMPANY = (640, 480)
+WITH_OWNER = (*range(6), *range(12, 18))
+"""Frames of 18 that show the head's owner, beside somebody larger who is always there."""
+
+
+def beside(number: int) -> Camera:
+    """That sees the head small, at the right."""
+    turn = rotation_from_vector(np.array([0.02, np.radians(2 * number - 15), 0.03]))
+    return Camera(*COMPANY, 2 * FOCAL, FACING @ turn, np.array([330.0 + number, 20.0, 1100.0]))
+
+
+@pytest.fixture(scope="module")
+def company(filmed: Filmed, shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A clip of two people."""
+    other = next(Video(shared / "data" / "videos" / "single_face.mp4").frames()).pixels()
+    wall = np.full((COMPANY[1], COMPANY[0], 3), 90, np.uint8)
+    wall[:360, :400] = other[:, 120:520]
+    renderer = HeadRenderer(filmed.head)
+    frames = [
+        renderer.draw(FaceState(), beside(number), background=wall)[..., :3]
+        if number in WITH_OWNER
+        else wall
+        for number in range(18)
+    ]
+    return written(tmp_path_factory.mktemp("company") / "two.mp4", frames)
+
+
+@pytest.mark.parametrize("lens", [f"{2 * FOCAL}px", None])
+def test_the_heads_owner_is_followed_beside_somebody_larger(
+    filmed: Filmed, company: Path, tmp_path: Path, lens: str | None
+) -> None:
+    tracked = track_video(company, filmed.head, TrackFiles(tmp_path / "t.csv"), lens=lens)
+    frames = load_track(tmp_path / "t.csv").frames
+    assert [item.frame for item in frames if item.state is not None] == list(WITH_OWNER)
+    assert [item.frame for item in frames if item.status == "reacquired"] == [12]
+    for item in frames:
+        if item.state is not None:
+            true = beside(item.frame)
+            turned = np.degrees(angle_between(item.state.R_cam_head, true.R_cam_head))
+            # Of a head at the side a lens that is not known turns the view.
+            assert turned < (1 if lens else 12)
+            bearing = item.state.t_cam_head / item.state.t_cam_head[2] * tracked.focal_px
+            wanted = true.t_cam_head / true.t_cam_head[2] * true.focal_px
+            np.testing.assert_allclose(bearing[:2], wanted[:2], atol=3)
+    (note,) = [note for note in tracked.notes if "lost" in note]
+    assert note.startswith(
+        "the face is lost in 6 of 18 frames, at 0.60 s first; faces were there, "
+    )
+
+
+def test_a_clip_of_somebody_else_alone(filmed: Filmed, shared: Path, tmp_path: Path) -> None:
+    pixels = next(Video(shared / "data" / "videos" / "single_face.mp4").frames()).pixels()
+    clip = written(tmp_path / "a.mp4", [pixels] * 3)
+    with pytest.raises(EstimationError, match=r"a\.mp4: .* found in none of 3 frames: faces were"):
+        track_video(clip, filmed.head, TrackFiles(tmp_path / "t.csv"), lens=LENS)
+    assert [item.status for item in load_track(tmp_path / "t.csv").frames] == ["lost"] * 3
+
+
+def test_a_face_that_the_edge_cuts_is_told_of_once(filmed: Filmed, tmp_path: Path) -> None:
+    cut = [pixels[:, WIDTH // 2 - 40 :] for pixels in filmed.frames[:5]]
+    wide = [np.pad(pixels, ((0, 0), (0, 40), (0, 0)), "edge") for pixels in cut]
+    tracked = track_video(
+        written(tmp_path / "a.mp4", wide), filmed.head, TrackFiles(tmp_path / "t.csv"), lens=LENS
+    )
+    (note,) = [note for note in tracked.notes if "edge" in note]
+    assert note.startswith("the edge cuts the face in 5 of 5 frames, at 0.00 s first")
+    assert not [note for note in filmed.tracked.notes if "edge" in note]

@@ -56,13 +56,13 @@ class Audience:
     def detect(self, photo: Photo, *, face: int | None = None) -> Landmarks:
         raise NoFaceError(photo.name)
 
-    def detect_fast(self, pixels: Array) -> DetectedFace | None:
+    def all_fast(self, pixels: Array) -> list[DetectedFace]:
         level = 40 * round(pixels.mean() / 40)
         if level not in PLAYED:
-            return None
+            return []
         points = np.random.default_rng(0).uniform(0, 48, size=(478, 3))
         points[UPPER_LIP] = points[LOWER_LIP]
-        return DetectedFace(points, PLAYED[level], np.diag([1.0, -1.0, -1.0]))
+        return [DetectedFace(points, PLAYED[level], np.diag([1.0, -1.0, -1.0]))]
 
 
 @pytest.mark.parametrize(

@@ -150,11 +150,12 @@ def _of_photo(head: Head, path: str | Path, options: SynthesisOptions | None, re
 
     photo = load_photo(path)
     found = find_head(head, photo)
+    notes = [f"{photo.name}: {note}" for note in photo.notes]
     synthesizer = HeadSynthesizer(head, options, reach=reach, rig=found.rig)
     made = synthesizer.synthesize(found.points)
     renderer = HeadRenderer(head, rig=synthesizer.rig)
     picture = renderer.draw_posed(made.face, found.camera, background=photo.pixels)
-    return _Made(synthesizer, made, picture, (*photo.notes, *found.notes))
+    return _Made(synthesizer, made, picture, (*notes, *found.notes))
 
 
 def _read_points(

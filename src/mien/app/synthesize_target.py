@@ -126,7 +126,7 @@ def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int |
         detected = steady_points(layout, detector, photo.pixels, landmarks.points)
     points = with_marks(layout, detected, read_marks(Path(path), photo, layout))
     motion = synthesizer.head_motion(points)
-    notes = [*photo.notes, *(f"{path}: {note}" for note in landmarks.notes)]
+    notes = [f"{path}: {note}" for note in (*photo.notes, *landmarks.notes)]
     notes += [*mark_notes(Path(path), layout), *_stranger_notes(synthesizer, path, points)]
     if motion.scale > _LARGER:
         times = f"{float(motion.scale):.1f} times as large as in the examples"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from mien.app.ready_head import ReadyHead
 from mien.app.track_files import OVERLAY, TrackFiles
 from mien.app.track_lens import LENS, find_focal
+from mien.app.track_notes import check_found, track_notes
 from mien.app.track_run import TRACKING, TrackRun
 from mien.arrays import check_positive
 from mien.capture.detector import LandmarkDetector
@@ -23,7 +24,7 @@ from mien.formats.track_journal import journal_of
 from mien.model.head import Head
 from mien.track.lens import parse_lens
 from mien.track.smooth import smooth
-from mien.track.state import STATUSES, Status, Track, TrackedFrame
+from mien.track.state import STATUSES, Status, Track
 from mien.track.tracker import TrackOptions
 
 if TYPE_CHECKING:
@@ -95,7 +96,8 @@ def track_video(
         max_side: px; larger pictures are tracked reduced to it.
         progress: told the stage, the frames done and their total.
     Raises: InputError, FileFormatError: before any work is done, a video or a place that cannot be
-        used, a lens, a journal of another run.
+        used, a lens, a journal of another run. EstimationError: when all is written, a video
+        whose frames are all lost.
     """
     tell = progress or (lambda stage, done, total: None)
     clip = Video(named_path("video", video, "a video"))
@@ -122,19 +124,12 @@ def track_video(
             seconds = time.perf_counter() - start
             track = run.track(tracker.layout, frames)
             shown = track if smooth_seconds is None else smooth(track, smooth_seconds)
-            notes += [*clip.notes, *_lost_notes(frames), *files.write(shown, clip, head, tell)]
+            others = tracker.met_others
+            notes += [*clip.notes, *track_notes(track, head, met_others=others)]
+            notes += files.write(shown, clip, head, tell)
             journal.remove()
+    check_found(track, clip.path, files.table, met_others=others)
     return _summary(track, len(kept), seconds, notes)
-
-
-def _lost_notes(frames: Sequence[TrackedFrame]) -> list[str]:
-    """How many frames, and when first."""
-    lost = [frame for frame in frames if frame.state is None]
-    if not lost:
-        return []
-    return [
-        f"the face is lost in {len(lost)} of {len(frames)} frames, at {lost[0].time:.2f} s first"
-    ]
 
 
 def _summary(track: Track, resumed: int, seconds: float, notes: Sequence[str]) -> Tracked:

@@ -11,6 +11,7 @@ from mien.app.live import LiveStatus, LiveSummary, run_live
 from mien.app.ready_head import ReadyHead
 from mien.app.track import MAX_SIDE
 from mien.app.track_files import TrackFiles
+from mien.app.track_notes import check_found, track_notes
 from mien.app.track_run import VideoTracker, mean_rate
 from mien.arrays import Array, UInt8
 from mien.capture.detector import LandmarkDetector
@@ -50,6 +51,7 @@ def track_live_video(
         seconds: of the source, after which it ends by itself.
         tell: told after every frame how it goes.
     Raises: InputError, FileFormatError: before anything is tracked, what cannot be used.
+        EstimationError: when all is written, a run whose frames are all lost.
     """
     if files is not None:
         files.check(Path(source))
@@ -59,10 +61,17 @@ def track_live_video(
         summary = run_live(
             source, head, take.begun, streams, seconds=seconds, max_side=MAX_SIDE, tell=tell
         )
-    notes = summary.notes
+    track, others = take.track(), take.met_others
+    notes = [*summary.notes, *track_notes(track, head, met_others=others)]
     if files is not None:
-        notes += tuple(files.write(take.track(), Video(Path(source)), head, lambda *step: None))
-    return replace(summary, notes=notes)
+        notes += files.write(track, Video(Path(source)), head, lambda *step: None)
+    table = None if files is None else files.table
+    check_found(track, _named(source), table, met_others=others)
+    return replace(summary, notes=tuple(notes))
+
+
+def _named(source: str) -> str:
+    return f"camera {source}" if source.isdecimal() else source
 
 
 @dataclass
@@ -101,6 +110,11 @@ class _Take:
             found = self.calm.step(found)
         self._frames.append(found)
         return found
+
+    @property
+    def met_others(self) -> bool:
+        """Whether in a lost frame there was a face."""
+        return self._tracker.met_others
 
     def track(self) -> Track:
         """All of them."""

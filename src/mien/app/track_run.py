@@ -32,6 +32,7 @@ class VideoTracker(Protocol):
     """What tracks; `mien.track.tracker.Tracker` does."""
 
     layout: Layout
+    met_others: bool
 
     def step(self, pixels: UInt8[Array, "h w 3"], frame: int, time: float) -> TrackedFrame: ...
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8
+from mien.capture.clip_notes import ClipNotes
 from mien.capture.detector import LandmarkDetector, closer
 from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
 from mien.capture.frame_choice import FrameScores
@@ -142,10 +143,11 @@ class _Gathered:
         video = Video(self.source)
         turn_upright(video, detector)
         self.quarters = video.quarters
-        total = video.facts().frames
+        total, odd = video.facts().frames, ClipNotes()
         with frames_ahead(video, max_side=self.max_side) as pictures:
             for picture in pictures:
                 faces = detector.all_fast(picture.pixels)
+                odd.look(picture.pixels, faces)
                 if not faces:
                     self.left_out[frame_name(picture.frame)] = "no face found"
                 else:
@@ -154,7 +156,7 @@ class _Gathered:
                     self._add(frame_name(picture.frame), picture.frame, picture.pixels, found)
                 if report is not None:
                     report(picture.frame + 1, max(total, picture.frame + 1))
-        self.notes += [f"{self.source.name}: {note}" for note in video.notes]
+        self.notes += [f"{self.source.name}: {note}" for note in (*video.notes, *odd.notes)]
 
     def read_photos(
         self, detector: LandmarkDetector, face: int | None, report: Report | None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from mien.capture.expression_names import check_expression_folders
 from mien.capture.files import listed
 from mien.capture.images import is_image
 from mien.capture.made_folders import made_by_mien
@@ -29,6 +30,7 @@ def photo_files(source: Path) -> dict[str, list[Path]]:
     photos = _photos_in(source)
     if photos:
         return {NEUTRAL: photos}
+    check_expression_folders(folder for folder in _subfolders(source) if _photos_in(folder))
     folders = {_expression(folder): _photos_in(folder) for folder in _subfolders(source)}
     folders = {name: paths for name, paths in folders.items() if paths}
     if not folders:

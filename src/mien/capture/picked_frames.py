@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mien.arrays import Array, Int, check_positive
+from mien.capture.clip_notes import ClipNotes
 from mien.capture.detector import LandmarkDetector
 from mien.capture.expression_choice import choose_expressions, name_expressions
 from mien.capture.folder import NEUTRAL
@@ -118,6 +119,7 @@ def _judge(
     """Scores of the frames, evenly spread in time, that show a face."""
     step = max(_SAMPLE_SECONDS, (video.facts().seconds or 0) / MAX_SAMPLES)
     rows: list[tuple[int, float, DetectedFace]] = []
+    odd = ClipNotes()
     due = -np.inf
     for frame in video.frames():
         report(0, frame.index)
@@ -127,10 +129,12 @@ def _judge(
         due = frame.seconds + step
         pixels = frame.pixels()
         small = shrunk(pixels, _ANALYSIS_SIDE)
-        found = detector.detect_fast(small)
-        if found is not None:
-            points = found.points[:, :2] * (max(pixels.shape) / max(small.shape))
-            rows.append((frame.index, face_sharpness(pixels, points), found))
+        faces = detector.all_fast(small)
+        odd.look(small, faces)
+        if faces:
+            points = faces[0].points[:, :2] * (max(pixels.shape) / max(small.shape))
+            rows.append((frame.index, face_sharpness(pixels, points), faces[0]))
     if not rows:
         raise EstimationError(f"{video.path}: no face found in any of its frames")
+    video.notes += odd.notes
     return FrameScores.of(*zip(*rows, strict=True))

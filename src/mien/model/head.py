@@ -9,6 +9,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, UInt8, check_array, check_image, frozen
 from mien.camera import Camera
+from mien.capture.expression_names import is_plain_name
 from mien.errors import InputError
 from mien.mesh import Mesh
 
@@ -176,5 +177,5 @@ def _check_expressions(expressions: dict[str, Expression], mesh: Mesh) -> None:
 
 def _check_name(where: str, name: str) -> None:
     """Names become file names and archive members, so they must be plain ones."""
-    if not name or name.startswith(".") or not name.isprintable() or set(name) & set('/\\:*?"<>|'):
+    if not is_plain_name(name):
         raise InputError(where, "names that can be file names", repr(name))

@@ -40,7 +40,7 @@ STRANGE_RMS = 20.0
 """Grey levels by which a drawn face is off from which on it is hardly the person's. Five heads are
 off by 2 to 13 on the median frame of their own clips and by 19.3 on the worst, on 45 clips of other
 people by 19.5 to 160, where they can be fitted at all."""
-_UNUSUAL = 2.5
+_UNUSUAL = 2.0
 """So many times as far off as in the best tenth of the frames before, a face that is not where it
 was in the last frame is another person's, if it is strange, too."""
 _ENOUGH = 5
@@ -112,6 +112,7 @@ class Tracker:
         """Go on as if these frames had been tracked."""
         self._past = list(frames[-2:])
         self._errors = [item.rms for item in frames if item.state is not None]
+        self.met_others = False
 
     def step(
         self,
@@ -251,7 +252,8 @@ class Tracker:
         assert last.state is not None
         guess = self._guess(last.state)
         before = self._past[0]
-        if len(self._past) < 2 or before.state is None:
+        # From another person's face to the head's own is no motion.
+        if len(self._past) < 2 or before.state is None or last.status == "reacquired":
             return guess
         ahead = (time - last.time) / max(last.time - before.time, 1e-3)
         ahead = float(np.clip(ahead, 0, 2))

@@ -1,0 +1,73 @@
+"""Which names an expression may have: they become files, morph targets, columns and options."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterable
+from pathlib import Path
+
+from mien.capture.mediapipe_face import BLENDSHAPE_NAMES
+from mien.errors import InputError
+
+MAX_NAME_BYTES = 200
+"""Of an expression's name in UTF-8: with an ending and what a temporary file adds, 255 is the most
+that file systems take."""
+_TEXTURES = frozenset({"atlas", "cylinder"})
+"""Of the neutral face."""
+_UNITS = frozenset(name.casefold() for name in (*BLENDSHAPE_NAMES, "tongueOut"))
+_DEVICES = frozenset(
+    ("con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10)))
+)
+_FORBIDDEN = '/\\:*?"<>|'
+
+
+def is_plain_name(name: str) -> bool:
+    """Whether it is one component of a path, on any system, and of an archive member's."""
+    return bool(
+        name and not name.startswith(".") and name.isprintable() and not set(name) & set(_FORBIDDEN)
+    )
+
+
+def check_expression_folders(folders: Iterable[Path]) -> None:
+    """Refuse folders whose names cannot be those of expressions.
+
+    A name is a file's on every system: no control characters, none of / \\ : * ? " < > |, no dot
+    or space at either end, no device of Windows', MAX_NAME_BYTES at most. It is no face unit's, no
+    texture's of the neutral face, and unlike every other one, however letters are written.
+    Raises: InputError: names the folder.
+    """
+    taken: dict[str, Path] = {}
+    for folder in sorted(folders):
+        problem = name_problem(folder.name)
+        if problem:
+            raise InputError(_shown(folder), "the name of an expression", problem)
+        other = taken.setdefault(_key(folder.name), folder)
+        if other is not folder:
+            expected = f"another name than that of {_shown(Path(other.name))}"
+            raise InputError(_shown(folder), expected, "the same but for case or accents")
+
+
+def name_problem(name: str) -> str:
+    """What keeps a name from being an expression's; "" where nothing does."""
+    odd = [mark for mark in name if mark in _FORBIDDEN or not mark.isprintable()]
+    if odd:
+        return f"{odd[0]!a} in it"
+    if name != name.strip(". "):
+        return f"a dot or a space at its {'end' if name[0] not in '. ' else 'beginning'}"
+    if len(name.encode()) > MAX_NAME_BYTES:
+        return f"{len(name.encode())} bytes, of which {MAX_NAME_BYTES} are the most"
+    if name.split(".")[0].strip().lower() in _DEVICES:
+        return "that of a device on Windows"
+    if _key(name) in _TEXTURES:
+        return "that of a texture of the neutral face"
+    return "that of a face unit" if _key(name) in _UNITS else ""
+
+
+def _key(name: str) -> str:
+    """Equal for names that some file system takes for one."""
+    return unicodedata.normalize("NFC", name).casefold()
+
+
+def _shown(path: Path) -> str:
+    """Names that are not UTF-8 with what they are escaped."""
+    return str(path).encode(errors="surrogateescape").decode(errors="backslashreplace")
