@@ -91,6 +91,20 @@ def test_shut_eyes_look_nowhere() -> None:
     np.testing.assert_array_equal(state.gaze, 0)
 
 
+def test_landmarks_outside_of_the_picture_say_nothing() -> None:
+    truth = replace(posed(), t_cam_head=np.array([230.0, -20.0, 600.0]))
+    face = face_of(truth)
+    outside = face.points[:, 0] > SIZE[0]
+    assert 100 < outside.sum() < 300
+    astray = face.points + np.where(outside, 25.0, 0.0)[:, None]
+    state = found(DetectedFace(astray, face.blendshapes, face.R_cam_head))
+    assert_pose(state, truth, degrees=0.5, share=0.005)
+    exact = found(face)
+    np.testing.assert_array_equal(state.R_cam_head, exact.R_cam_head)
+    np.testing.assert_array_equal(state.t_cam_head, exact.t_cam_head)
+    np.testing.assert_array_equal(state.weights, exact.weights)
+
+
 def test_no_face_is_no_state() -> None:
     pixels = np.zeros((480, 640, 3), np.uint8)
     assert starter().find(pixels, focal_px=FOCAL) == []

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 
+import cv2
 import numpy as np
 import pytest
 
@@ -16,7 +17,7 @@ from mien.numeric.rotation import angle_between
 from mien.track.guess import Guess
 from mien.track.start import Found, Starter
 from mien.track.state import TrackedFrame, TrackState
-from mien.track.tracker import Tracker, TrackOptions
+from mien.track.tracker import STRANGE_RMS, Tracker, TrackOptions
 
 FRAMES, FPS = 8, 25.0
 NOBODY = np.full((patterned.SIZE, patterned.SIZE, 3), 70, np.uint8)
@@ -183,3 +184,42 @@ def test_units_of_ones_choice() -> None:
             detector=Blind(),
             options=TrackOptions(units=("wink",)),
         )
+
+
+def test_of_several_faces_the_heads_own_is_found(
+    told: Told, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first, larger one is somewhere else; the landmarks of both fit alike."""
+    elsewhere = Found(state_of(Guess(patterned.pose((0, 0, 0), (90, 40, 500)), truth(0).face)), 1.0)
+    alone = told.find
+    monkeypatch.setattr(Starter, "find", lambda *rest, **options: [elsewhere, *alone(**options)])
+    by = tracker()
+    found = by.step(frame(0), 0, 0.0)
+    assert found.status == "ok"
+    assert_truth(found, 0, degrees=0.3, share=0.005, weights=0.08)
+    assert not by.met_others
+
+
+def disturbed(number: int) -> Array:
+    """A frame that shows the face off by some 25 grey levels, in spots as large as features."""
+    coarse = np.random.default_rng(1).normal(0, 45, (12, 12))
+    spots = cv2.resize(coarse, (patterned.SIZE, patterned.SIZE), interpolation=cv2.INTER_CUBIC)
+    return np.clip(frame(number) + spots[..., None], 0, 255).astype(np.uint8)
+
+
+def test_after_the_head_no_other_face_is_taken_for_it(told: Told) -> None:
+    other = disturbed(6)
+    told.number = 6
+    alone = tracker()
+    assert alone.step(other, 0, 0.0).rms > STRANGE_RMS, "where nobody else was, it may be the head"
+    told.number = 0
+    by = tracker()
+    assert [item.status for item in followed([frame(k) for k in range(5)], by)] == ["ok"] * 5
+    told.number = None
+    assert by.step(NOBODY, 5, 5 / FPS).status == "lost"
+    assert not by.met_others
+    told.number = 6
+    assert by.step(other, 6, 6 / FPS).status == "lost"
+    assert by.met_others
+    told.number = 7
+    assert by.step(frame(7), 7, 7 / FPS).status == "reacquired"

@@ -11,6 +11,7 @@ import numpy as np
 
 from mien.app.example_marks import mark_files, mark_notes, read_marks, with_marks
 from mien.arrays import Array, Float, Int
+from mien.capture.landmarks import inside_picture
 from mien.capture.photos import load_photo
 from mien.errors import EstimationError, InputError
 from mien.formats.atomic import check_file_place, check_files_apart
@@ -111,6 +112,8 @@ def target_from_points(
 def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int | None) -> Target:
     """The points of a photo's face; marks beside the photo win, as for `mien examples`.
 
+    Those outside of the photo follow from the others and from what is known of the person.
+
     Args:
         face: which one, from left to right from 1; None: the largest.
     Raises: InputError, FileFormatError: no photo, or a damaged one; no such face. EstimationError:
@@ -125,6 +128,9 @@ def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int |
         # As the examples' points are found: see there.
         detected = steady_points(layout, detector, photo.pixels, landmarks.points)
     points = with_marks(layout, detected, read_marks(Path(path), photo, layout))
+    known = np.flatnonzero(inside_picture(points, photo.size))
+    if LEAST_TELLING <= len(known) < len(points):
+        points = synthesizer.complete(known, points[known], head="told")
     motion = synthesizer.head_motion(points)
     notes = [f"{path}: {note}" for note in (*photo.notes, *landmarks.notes)]
     notes += [*mark_notes(Path(path), layout), *_stranger_notes(synthesizer, path, points)]

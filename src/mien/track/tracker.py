@@ -37,9 +37,9 @@ _MEASURED_DEVIATION = 0.08
 _LEAST_LIKENESS, _LEAST_SEEN = 0.6, 0.3
 """Below these a face is lost: the drawn face does not look like the frame, or it is covered."""
 STRANGE_RMS = 20.0
-"""Grey levels by which a drawn face is off from which on it is hardly the person's. Five heads are
-off by 2 to 13 on the median frame of their own clips and by 19.3 on the worst, on 45 clips of other
-people by 19.5 to 160, where they can be fitted at all."""
+"""Grey levels by which a drawn face is off from which on it is hardly the person's. Four heads are
+off by 3 to 11 on the median frame of clips of their people and by 19.3 on the worst, on other
+people's clips by 19.5 to 161 (docs/tracking-method.md)."""
 _UNUSUAL = 2.0
 """So many times as far off as in the best tenth of the frames before, a face that is not where it
 was in the last frame is another person's, if it is strange, too."""
