@@ -134,7 +134,7 @@ class TestWhatIsRead:
         (place / "mine").mkdir()
         for source in (place, place / "mine", place / "notes.txt"):
             with (
-                pytest.raises(InputError, match="a folder that nothing is read from, got one with"),
+                pytest.raises(InputError, match="a folder that nothing is read from, got"),
                 atomic_folder(place, replaces=always, read=[source]),
             ):
                 pass

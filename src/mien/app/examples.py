@@ -27,6 +27,7 @@ from mien.capture.detector import LandmarkDetector
 from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of, rows_of
 from mien.capture.notes import gathered_notes
 from mien.capture.photos import Photo, load_photo
+from mien.capture.source_kind import kind_of_source
 from mien.formats.atomic import atomic_folder
 from mien.formats.example_folder import (
     check_example_place,
@@ -122,6 +123,7 @@ def write_example_folder(
         `gather_examples`, a source that mien made, and a place that holds something else.
     """
     tell = progress or (lambda stage, done, total: None)
+    kind_of_source(source)
     check_example_place(folder, read=[source])
     gathered = gather_examples(source, request=request, progress=tell)
     tell(WRITING, 0, 0)

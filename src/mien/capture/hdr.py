@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numba import njit
 
 from mien.arrays import Array, Float, UInt8, UInt16
+from mien.numeric.jit import njit
 from mien.numeric.threads import for_row_bands
 
 PQ, HLG = 16, 18

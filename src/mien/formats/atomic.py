@@ -161,14 +161,14 @@ def check_folder_place(
             return
         if not target.is_dir():
             raise InputError(path, "a folder's name", "a file of that name")
-        for source in read:
-            if _target(source).is_relative_to(target):
-                found = f"one with {source}" if _target(source) != target else "what is read"
-                raise InputError(path, "a folder that nothing is read from", found)
         if any(target.iterdir()) and not replaces(target):
             raise InputError(
                 path, "a new folder or one made by mien", "a folder with other things in it"
             )
+        for source in read:
+            if _target(source).is_relative_to(target):
+                found = f"one with {source}" if _target(source) != target else "what is read"
+                raise InputError(path, "a folder that nothing is read from", found)
 
 
 def _swap(new: Path, target: Path) -> None:
