@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import resource
 import time
 import zipfile
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from memory import peak_bytes
 from mien.errors import FileFormatError, InputError
 from mien.limits import MAX_ARRAY_BYTES, MAX_ARRAYS
 from mien.npz import ArrayFile
@@ -141,7 +141,7 @@ def test_an_array_that_nobody_asks_for_is_never_unpacked(path: Path) -> None:
     ):
         for _ in range(1 << 10):
             stream.write(bytes(1 << 20))
-    before, start = peak(), time.perf_counter()
+    before, start = peak_bytes(), time.perf_counter()
     np.testing.assert_array_equal(geometries(path), GEOMETRIES)
     with (
         ArrayFile(path) as arrays,
@@ -149,12 +149,7 @@ def test_an_array_that_nobody_asks_for_is_never_unpacked(path: Path) -> None:
     ):
         arrays.numbers("extra", (None,))
     assert time.perf_counter() - start < 1
-    assert peak() - before < MAX_ARRAY_BYTES / 10
-
-
-def peak() -> int:
-    """Bytes that the process has had at once."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    assert peak_bytes() - before < MAX_ARRAY_BYTES / 10
 
 
 def test_an_array_that_unpacks_to_more_than_it_states_is_refused(path: Path) -> None:
