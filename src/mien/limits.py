@@ -1,6 +1,6 @@
-"""How much of anything is read and made; beyond, a clear refusal before any work (docs/limits.md).
+"""How much of anything is read and made; what is beyond is refused before any work.
 
-Every limit has its number here alone.
+docs/reference/limits.md is about them. Every limit has its number here alone.
 """
 
 from __future__ import annotations

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mien.animate.curves import Curve
 from mien.animate.layers import Blink, Breathing
+from mien.animate.timeline import Layer, Timeline
 from mien.errors import InputError
+from mien.limits import UNIT_RANGE
 
 TIMES = np.arange(0, 60, 1 / 120)
 
@@ -69,3 +72,16 @@ def test_breathing_is_small_slow_and_goes_on() -> None:
 def test_bad_parameters_are_named(make, message: str) -> None:
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_a_blink_over_a_recorded_blink_closes_the_lids_once() -> None:
+    """The sum stays where a face unit may be; lids that somebody drove further stay there."""
+    shut, wide = (Curve(np.array([0.0, 8.0]), np.full(2, amount)) for amount in (1.0, 2.0))
+    times = np.linspace(0, 8, 2000)
+    layer = Layer(generator=Blink())
+    for recorded, most in ((shut, UNIT_RANGE[1]), (wide, 2.0)):
+        timeline = Timeline(8.0, tracks={"units.eyeBlinkLeft": recorded}, layers=(layer,))
+        found = timeline.sample(times)
+        assert found["units.eyeBlinkLeft"].max() == pytest.approx(most)
+        assert found["units.eyeBlinkLeft"].min() == pytest.approx(recorded.values[0])
+        assert found["units.eyeBlinkRight"].max() == pytest.approx(1, abs=0.05)

@@ -14,7 +14,7 @@ from mien.animate.layers import Generator
 from mien.arrays import Array, Float, check_array, check_positive, frozen
 from mien.errors import InputError
 from mien.expressions.state import FaceState
-from mien.limits import MAX_FPS, MAX_FRAMES, MAX_SECONDS, MAX_SIDE
+from mien.limits import MAX_FPS, MAX_FRAMES, MAX_SECONDS, MAX_SIDE, UNIT_RANGE
 
 PIVOT_MM = (0.0, -60.0, -80.0)
 """Head space: the top of the neck, where a skull nods and turns."""
@@ -148,7 +148,9 @@ class Timeline:
             weight = layer.weight.at(times)
             _add(total, layer.tracks, times, weight)
             self._add_clips(total, layer.placements, times, weight)
+            before = dict(total)
             _add(total, made, times, weight)
+            _hold_within(total, before, made)
         return total
 
     @cached_property
@@ -196,6 +198,17 @@ class Timeline:
 def _add(total: dict[str, Array], tracks: Tracks, times: Array, weight: Array) -> None:
     for channel, curve in tracks.items():
         total[channel] = total.get(channel, 0.0) + weight * curve.at(times)
+
+
+def _hold_within(
+    total: dict[str, Array], before: Mapping[str, Array], made: Mapping[str, Curve]
+) -> None:
+    """A motion that makes itself takes no face unit beyond its range: lids close but once."""
+    for channel in made:
+        if channel.startswith(f"{channels.UNITS}."):
+            given = before.get(channel, np.zeros_like(total[channel]))
+            low, high = np.minimum(given, UNIT_RANGE[0]), np.maximum(given, UNIT_RANGE[1])
+            total[channel] = np.clip(total[channel], low, high)
 
 
 def _check_at_most(name: str, value: float, most: float) -> None:

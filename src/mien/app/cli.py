@@ -22,6 +22,7 @@ from mien.app.options import (
 )
 from mien.app.printing import Json, print_error, print_result
 from mien.app.progress import terminal_progress
+from mien.limits import MAX_FPS, MAX_SIDE, MIN_FPS
 
 app = typer.Typer(
     help="Photographs of a real person to a textured head.",
@@ -80,7 +81,7 @@ def build(
         FillChoice, typer.Option(help="How texture that no photo shows is filled.")
     ] = "pyramid",
     texture_size: Annotated[
-        int, typer.Option(min=64, max=8192, help="Side of the texture, px.")
+        int, typer.Option(min=64, max=MAX_SIDE, help="Side of the texture, px.")
     ] = 2048,
     interpupillary_mm: Annotated[
         float, typer.Option(min=30, max=100, help="Measured distance between the pupils.")
@@ -226,7 +227,7 @@ def animate(
     head: Annotated[Path, typer.Option(help="A head folder that `mien build` made.")],
     fps: Annotated[
         float | None,
-        typer.Option(min=0.01, max=1000, help="Frames a second; the timeline's by default."),
+        typer.Option(min=MIN_FPS, max=MAX_FPS, help="Frames a second; the timeline's by default."),
     ] = None,
     size: Annotated[
         str | None, typer.Option(help="WIDTHxHEIGHT in px; the timeline's by default.")
