@@ -20,7 +20,7 @@ from mien.app.options import (
     parse_size,
     parse_state,
 )
-from mien.app.printing import Json, print_error, print_result
+from mien.app.printing import Json, print_error, print_result, set_up_streams
 from mien.app.progress import terminal_progress
 from mien.limits import MAX_FPS, MAX_SIDE, MIN_FPS
 
@@ -270,6 +270,7 @@ app.command()(synthesize)
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line. Returns the exit status."""
+    set_up_streams()
     arguments = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in arguments
     arguments = [argument for argument in arguments if argument != "--debug"]

@@ -25,6 +25,7 @@ from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.detector import LandmarkDetector
 from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of, rows_of
+from mien.capture.files import plain_name
 from mien.capture.notes import gathered_notes
 from mien.capture.photos import Photo, load_photo
 from mien.capture.source_kind import kind_of_source
@@ -171,7 +172,7 @@ def gather_examples(
     rows = plan.choice.rows.tolist()
     photos = dict(load_pictures(series, rows, partial(tell, FETCHING)))
     plan = plan.with_points(_steady(series, layout, photos, marks, partial(tell, LOOKING)))
-    video = series.source.name if series.is_video else ""
+    video = plain_name(series.source) if series.is_video else ""
     examples, why = build_examples(plan, photos, source=video, even=request.even)
     pictures = dict(zip(plan.names, plan.choice.reasons, strict=True)) | series.left_out
     unused = [note for file in series.files for note in mark_notes(file, layout)]

@@ -17,7 +17,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,3})?", re.ASCII | re.IG
 
 
 def check_given(arguments: Sequence[str]) -> None:
-    """Refuse arguments that are empty: as a path, they would mean the current folder.
+    """Refuse arguments that are empty, which as a path would mean the current folder, or hold NUL.
 
     Raises: InputError: names the option, or the place among the arguments.
     """
@@ -30,6 +30,8 @@ def check_given(arguments: Sequence[str]) -> None:
             raise InputError(name, "something", "an empty argument")
         if argument.startswith("--") and argument.endswith("="):
             raise InputError(argument[:-1], "something after =", "nothing")
+        if "\0" in argument:
+            raise InputError("arguments", "text without NUL", argument)
 
 
 def check_finite(name: str, value: float) -> float:

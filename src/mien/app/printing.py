@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import json
 import sys
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import typer
 
-from mien.errors import FileFormatError, InputError, MienError
+from mien.errors import FileFormatError, InputError, MienError, escaped
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, no bars.")]
 
@@ -18,7 +20,8 @@ def print_error(error: Exception, *, as_json: bool) -> None:
     line = _one_line(error)
     print("error:", line, file=sys.stderr)
     if as_json:
-        print(json.dumps({"error": {"message": line} | _parts(error)}, indent=2))
+        data = {"error": {"message": line} | _parts(error)}
+        print(json.dumps(_escaped_within(data), indent=2))
 
 
 def _one_line(error: Exception) -> str:
@@ -31,7 +34,7 @@ def _one_line(error: Exception) -> str:
         # Click turns the end of a file into an abortion of its own.
         cause = error.__cause__ or error
         text = f"internal error: {type(cause).__name__}: {cause} (--debug shows where)"
-    return " ".join(text.split())
+    return " ".join(escaped(text).split())
 
 
 def _parts(error: Exception) -> dict[str, str]:
@@ -47,6 +50,21 @@ def print_result(
     as_json: bool, data: dict[str, Any], text: str, notes: tuple[str, ...] = ()
 ) -> None:
     """The result on stdout; notes, which the JSON has in it, on stderr."""
-    print(json.dumps(data, indent=2) if as_json else text)
+    print(json.dumps(_escaped_within(data), indent=2) if as_json else escaped(text))
     for note in () if as_json else notes:
-        print("note:", note, file=sys.stderr)
+        print("note:", escaped(note), file=sys.stderr)
+
+
+def set_up_streams() -> None:
+    """From here on, no character stops a line: what a terminal cannot show is escaped."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _escaped_within(data: Any) -> Any:
+    if isinstance(data, str):
+        return escaped(data)
+    if isinstance(data, Mapping):
+        return {key: _escaped_within(value) for key, value in data.items()}
+    return [_escaped_within(item) for item in data] if isinstance(data, (list, tuple)) else data

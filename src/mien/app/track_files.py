@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from mien.animate.tracked import track_moments
 from mien.app.explained import units_of
+from mien.capture.files import plain_name
 from mien.capture.video import Video
 from mien.errors import InputError
 from mien.formats.atomic import check_file_place, check_files_apart
@@ -99,7 +100,7 @@ class TrackFiles:
             write_track_plots(
                 self.plots,
                 track,
-                title=video.path.name,
+                title=plain_name(video.path),
                 video=video,
                 head=renderer,
                 progress=partial(tell, PLOTS),

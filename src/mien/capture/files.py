@@ -8,6 +8,8 @@ from pathlib import Path
 
 from mien.errors import FileFormatError, InputError
 
+_PLAINLESS = re.compile(r"[\x00-\x1f\x7f\\\ud800-\udfff]")
+
 _SIGNATURES = (
     (b"%!PS", "PostScript"),
     (b"\xc5\xd0\xd3\xc6", "PostScript"),
@@ -61,6 +63,13 @@ def check_readable(path: Path, kind: str) -> None:
         raise InputError(path, f"{kind} that can be read", error.strerror or error) from None
     if empty:
         raise FileFormatError(path, f"expected {kind}, found an empty file")
+
+
+def plain_name(path: Path) -> str:
+    """A file's name as every system can write it, within a path too: bytes that are no text,
+    backslashes and control characters become %NN.
+    """
+    return _PLAINLESS.sub(lambda match: f"%{ord(match[0]) & 0xFF:02X}", path.name)
 
 
 def kind_of(path: Path) -> str:

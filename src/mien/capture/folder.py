@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mien.capture.expression_names import check_expression_folders
-from mien.capture.files import listed
+from mien.capture.files import listed, plain_name
 from mien.capture.images import is_image
 from mien.capture.made_folders import made_by_mien
 from mien.capture.other_kinds import counted, is_unread
 from mien.capture.photos import PHOTO_SUFFIXES
 from mien.capture.source_kind import VIDEO_SUFFIXES, kind_of_source
-from mien.errors import InputError
+from mien.errors import InputError, escaped
 
 NEUTRAL = "neutral"
 ANNOTATIONS = "annotations"
@@ -41,7 +41,7 @@ def photo_files(source: Path) -> dict[str, list[Path]]:
 
 def _expression(folder: Path) -> str:
     """A folder's name; `Neutral` is `neutral`, as other stages look for that."""
-    return NEUTRAL if folder.name.lower() == NEUTRAL else folder.name
+    return NEUTRAL if folder.name.lower() == NEUTRAL else plain_name(folder)
 
 
 def ignored_files(source: Path) -> list[str]:
@@ -56,7 +56,7 @@ def ignored_files(source: Path) -> list[str]:
     if flat:
         ignored += [folder for folder in _subfolders(source) if _photos_in(folder)]
     if ignored:
-        shown = ", ".join(str(path.relative_to(source)) for path in ignored[:5])
+        shown = ", ".join(escaped(str(path.relative_to(source))) for path in ignored[:5])
         more = ", ..." if len(ignored) > 5 else ""
         notes.append(f"not used, as they are no photos or lie beside photos: {shown}{more}")
     return notes
@@ -69,7 +69,7 @@ def orphaned_annotations(photos: Sequence[Path]) -> list[str]:
         return []
     stems = {path.stem for path in listed(photos[0].parent)}
     return [
-        f"{ANNOTATIONS}/{path.name}: there is no photo of that name"
+        f"{ANNOTATIONS}/{escaped(path.name)}: there is no photo of that name"
         for path in listed(folder)
         if path.suffix == ".json" and path.stem not in stems
     ]

@@ -10,7 +10,7 @@ import numpy as np
 
 from mien.arrays import Array, UInt8, check_image, check_positive, frozen
 from mien.capture.exif import focal_prior_px, orientation
-from mien.capture.files import named_path
+from mien.capture.files import named_path, plain_name
 from mien.capture.images import opened_image
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def load_photo(path: str | Path, *, max_side: int = MAX_SIDE) -> Photo:
     if scale < 1:
         notes.append(f"scaled from {original[0]}x{original[1]} to {upright.width}x{upright.height}")
     focal = None if focal_per_px is None else focal_per_px * scale
-    return Photo(path.name, path, pixels, focal, original, tuple(notes))
+    return Photo(plain_name(path), path, pixels, focal, original, tuple(notes))
 
 
 def shrunk(pixels: UInt8[Array, "h w 3"], side: int) -> UInt8[Array, "h w 3"]:

@@ -19,7 +19,7 @@ import numpy as np
 from mien.animate.channels import head_angles
 from mien.arrays import Array, Float, Int, check_array, check_rotation, frozen
 from mien.assets.generic import load_generic_head
-from mien.errors import EstimationError, InputError
+from mien.errors import EstimationError, InputError, escaped
 from mien.formats.atomic import atomic_file
 from mien.formats.fap_table import (
     COUNT,
@@ -150,7 +150,7 @@ def write_fap(
     if not (fps >= 1 and float(fps).is_integer()):
         expected = "a whole number of frames a second, which is all that it can say"
         raise InputError(path, expected, f"{fps:g}")
-    title = "_".join((name or Path(path).stem).split()) or "mien"
+    title = "_".join(escaped(name or Path(path).stem).split()) or "mien"
     mask = " ".join("1" if number in MEASURED else "0" for number in range(1, COUNT + 1))
     chosen, count = np.array(sorted(MEASURED)) - 1, 0
     # The first line tells how many follow, which is known at the end.
