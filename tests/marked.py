@@ -31,6 +31,9 @@ class Blind(LandmarkDetector):
     def all_fast(self, pixels: Array) -> list[DetectedFace]:
         return []
 
+    def all_in_parts(self, pixels: Array) -> list[DetectedFace]:
+        return []
+
 
 class Shown(Blind):
     """Sees the faces that it is told, one after the other."""

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,13 +21,16 @@ def test_every_fifth_of_the_first_frames_is_looked_at(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[Array] = []
+    tracker = SimpleNamespace(resembles=lambda pixels, found: True)
 
-    def estimate(frames: object, *rest: object) -> FocalEstimate:
+    def estimate(frames: object, *rest: object, is_own: object) -> FocalEstimate:
+        assert is_own is tracker.resembles
         seen.extend(frames)
         return FocalEstimate(400.0, 0.1, 2, "a note")
 
     monkeypatch.setattr(mien.app.track_lens, "estimate_focal", estimate)
     monkeypatch.setattr(ReadyHead, "starter", None)
+    monkeypatch.setattr(ReadyHead, "tracker", lambda ready, *size: tracker)
     monkeypatch.setattr(mien.app.track_lens, "_SIDE", 32)
     levels = range(20, 140, 10)
     frames = (np.full((48, 64, 3), level, np.uint8) for level in levels)

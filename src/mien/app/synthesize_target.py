@@ -18,7 +18,14 @@ from mien.formats.atomic import check_file_place, check_files_apart
 from mien.formats.image import image_kind
 from mien.formats.points_file import read_points
 from mien.numeric.planar_motion import PlanarMotion
-from mien.synthesis.plausible import STRANGER, face_width, head_moved, look_mirrored, oddness
+from mien.synthesis.plausible import (
+    ENOUGH_STATISTICS,
+    STRANGER,
+    face_width,
+    head_moved,
+    look_mirrored,
+    oddness,
+)
 from mien.synthesis.steady import steady_points
 from mien.synthesis.synthesizer import LEAST_TELLING, Synthesizer
 
@@ -112,7 +119,7 @@ def target_from_points(
 def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int | None) -> Target:
     """The points of a photo's face; marks beside the photo win, as for `mien examples`.
 
-    Those outside of the photo follow from the others and from what is known of the person.
+    Those outside of the photo follow from the others, where enough is known of the person.
 
     Args:
         face: which one, from left to right from 1; None: the largest.
@@ -128,9 +135,7 @@ def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int |
         # As the examples' points are found: see there.
         detected = steady_points(layout, detector, photo.pixels, landmarks.points)
     points = with_marks(layout, detected, read_marks(Path(path), photo, layout))
-    known = np.flatnonzero(inside_picture(points, photo.size))
-    if LEAST_TELLING <= len(known) < len(points):
-        points = synthesizer.complete(known, points[known], head="told")
+    points = _guessed_outside(synthesizer, points, photo.size)
     motion = synthesizer.head_motion(points)
     notes = [f"{path}: {note}" for note in (*photo.notes, *landmarks.notes)]
     notes += [*mark_notes(Path(path), layout), *_stranger_notes(synthesizer, path, points)]
@@ -138,6 +143,18 @@ def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int |
         times = f"{float(motion.scale):.1f} times as large as in the examples"
         notes.append(f"{path}: the face is {times}: the picture is as soft as they are")
     return Target(points, motion, photo.size, tuple(notes))
+
+
+def _guessed_outside(
+    synthesizer: Synthesizer, points: Float[Array, "n 2"], size: tuple[int, int]
+) -> Float[Array, "n 2"]:
+    """Points beyond the edge of a picture from those inside, where enough is known of the person:
+    10 to 20 % nearer than the detector's guess where the edge cuts more than the chin (cap13)."""
+    known = np.flatnonzero(inside_picture(points, size))
+    enough = len(synthesizer.examples.statistics) >= ENOUGH_STATISTICS
+    if not enough or not LEAST_TELLING <= len(known) < len(points):
+        return points
+    return synthesizer.complete(known, points[known], head="told")
 
 
 def _check_sides(
