@@ -24,6 +24,9 @@ MAX_PHOTO_SIDE = 65_535
 MAX_MM = 10_000.0
 """Of a vertex' coordinate and of a face unit's offset, from 0 either way."""
 
+MAX_NAME_BYTES = 200
+"""Of an expression's name in UTF-8: files are named after it, and such names end at 255."""
+
 UNIT_RANGE = (-0.5, 1.5)
 """Weight of a face unit, the lowest and the highest: as those of photographed expressions."""
 

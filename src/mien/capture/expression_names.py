@@ -6,15 +6,11 @@ import unicodedata
 from collections.abc import Iterable
 from pathlib import Path
 
-from mien.capture.mediapipe_face import BLENDSHAPE_NAMES
 from mien.errors import InputError
+from mien.limits import MAX_NAME_BYTES
 
-MAX_NAME_BYTES = 200
-"""Of an expression's name in UTF-8: with an ending and what a temporary file adds, 255 is the most
-that file systems take."""
 _TEXTURES = frozenset({"atlas", "cylinder"})
 """Of the neutral face."""
-_UNITS = frozenset(name.casefold() for name in (*BLENDSHAPE_NAMES, "tongueOut"))
 _DEVICES = frozenset(
     ("con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10)))
 )
@@ -32,8 +28,8 @@ def check_expression_folders(folders: Iterable[Path]) -> None:
     """Refuse folders whose names cannot be those of expressions.
 
     A name is a file's on every system: no control characters, none of / \\ : * ? " < > |, no dot
-    or space at either end, no device of Windows', MAX_NAME_BYTES at most. It is no face unit's, no
-    texture's of the neutral face, and unlike every other one, however letters are written.
+    or space at either end, no device of Windows', MAX_NAME_BYTES at most. It is no texture's of the
+    neutral face, and unlike every other one, however letters are written.
     Raises: InputError: names the folder.
     """
     taken: dict[str, Path] = {}
@@ -58,9 +54,7 @@ def name_problem(name: str) -> str:
         return f"{len(name.encode())} bytes, of which {MAX_NAME_BYTES} are the most"
     if name.split(".")[0].strip().lower() in _DEVICES:
         return "that of a device on Windows"
-    if _key(name) in _TEXTURES:
-        return "that of a texture of the neutral face"
-    return "that of a face unit" if _key(name) in _UNITS else ""
+    return "that of a texture of the neutral face" if _key(name) in _TEXTURES else ""
 
 
 def _key(name: str) -> str:
