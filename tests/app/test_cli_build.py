@@ -16,7 +16,7 @@ from PIL import Image
 
 from mien.errors import InputError
 from mien.expressions.regions import MASKS
-from mien.formats.head_folder import load_head
+from mien.formats.head_folder import load_head, save_head
 from terminal import FAST, SHORT_TURNTABLE, Built, Mien
 
 Contents = Callable[[Path], dict[str, bytes]]
@@ -36,6 +36,7 @@ def test_the_head_folder_is_what_the_design_says(built: Built) -> None:
         "annotations/left.json",
         "annotations/right.json",
         *(f"regions/{name}.png" for name in MASKS),
+        ".mien-files.json",
     }
 
 
@@ -236,8 +237,11 @@ def test_a_build_that_is_killed_leaves_the_old_head(
 def test_an_old_head_is_replaced_whole(
     built: Built, rebuilt: None, mien: Mien, tmp_path: Path, contents: Contents
 ) -> None:
-    head = shutil.copytree(built.folder, tmp_path / "head")
-    (head / "textures" / "stale.png").write_bytes(b"old")
+    head = tmp_path / "head"
+    save_head(
+        built.result.head, head, photos=[("of_the_last_build.png", np.zeros((8, 8, 3), "u1"))]
+    )
+    assert "photos/of_the_last_build.png" in contents(head)
     assert mien("build", built.source, "-o", head, "--json").json
     assert contents(head) == contents(built.folder)
     assert [path.name for path in tmp_path.iterdir()] == ["head"]
