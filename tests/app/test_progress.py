@@ -71,8 +71,7 @@ def test_the_first_run_says_that_it_compiles(
     (folder,) = tmp_path.iterdir()
     (folder / "kernel.nbi").touch()
     assert "ompiling" not in said()
-    monkeypatch.setattr("mien.app.progress.kernel_folders", lambda: ())
-    monkeypatch.setattr("mien.app.progress.kernels_are_kept", lambda: False)
+    monkeypatch.setattr("mien.numeric.kernel_files.kernel_folders", lambda: ())
     with terminal_progress(quiet=False) as progress:
         progress("Stage", 1, 1)
     assert "NUMBA_CACHE_DIR may name one." in " ".join(capsys.readouterr().err.split())

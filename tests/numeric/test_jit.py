@@ -114,3 +114,13 @@ def test_without_any_place_to_keep_it(program: Program) -> None:
         text=True,
     )
     assert (done.stdout.splitlines(), done.stderr) == (["8 0", "()"], "")
+
+
+def test_every_kernel_is_compiled_by_it() -> None:
+    source = Path(__file__).parents[2] / "src" / "mien"
+    others = [
+        path.name
+        for path in source.rglob("*.py")
+        if path.name != "jit.py" and "from numba import njit" in path.read_text(encoding="utf-8")
+    ]
+    assert others == []

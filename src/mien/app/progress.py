@@ -6,8 +6,6 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from mien.numeric.kernel_files import kernel_folders, kernels_are_kept
-
 if TYPE_CHECKING:
     from rich.progress import Task
 
@@ -36,6 +34,8 @@ def terminal_progress(quiet: bool, *, counted: Collection[str] = ()) -> Iterator
     from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars
 
+    from mien.numeric import kernel_files
+
     bars = Bars(
         TextColumn("{task.description:<34}"),
         BarColumn(bar_width=28),
@@ -49,8 +49,9 @@ def terminal_progress(quiet: bool, *, counted: Collection[str] = ()) -> Iterator
 
     def advance(stage: str, done: int, total: int) -> None:
         if not tasks:
-            if not kernels_are_kept():
-                bars.console.print(_COMPILING if kernel_folders() else _COMPILING_EVERY_TIME)
+            if not kernel_files.kernels_are_kept():
+                places = kernel_files.kernel_folders()
+                bars.console.print(_COMPILING if places else _COMPILING_EVERY_TIME)
             bars.start()
         if stage not in tasks:
             tasks[stage] = bars.add_task(stage, total=total or None, speed="")
