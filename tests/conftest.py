@@ -2,10 +2,27 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Processes that test side by side share the cores, and with them each its threads."""
+    processes = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", 1))
+    if hasattr(config, "workerinput"):
+        import cv2
+        import numba
+
+        threads = max(1, numba.config.NUMBA_NUM_THREADS // processes)
+        numba.set_num_threads(threads)
+        cv2.setNumThreads(threads)
+    elif config.getoption("numprocesses", None):
+        # Read when NumPy is loaded, which here is too late, but not in the processes to come.
+        for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+            os.environ.setdefault(variable, "1")
 
 
 @pytest.fixture

@@ -80,7 +80,7 @@ class HeadAnimation:
 
         if self.rotations is None:
             return None
-        quaternions: Array = Rotation.from_matrix(self.rotations).as_quat()
+        quaternions: Array = Rotation.from_matrix(self.rotations.copy()).as_quat()
         agree = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
         signs = np.cumprod(np.concatenate([[1.0], np.where(agree < 0, -1.0, 1.0)]))
         return signs[:, None] * quaternions

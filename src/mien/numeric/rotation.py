@@ -16,7 +16,7 @@ def rotation_from_vector(vector: Float[Array, "*batch 3"]) -> Float[Array, "*bat
     """
     from scipy.spatial.transform import Rotation
 
-    vector = np.asarray(vector, dtype=np.float64)
+    vector = np.array(vector, dtype=np.float64)
     matrices: Array = Rotation.from_rotvec(vector.reshape(-1, 3)).as_matrix()
     return matrices.reshape(*vector.shape, 3)
 
@@ -25,7 +25,8 @@ def rotation_to_vector(rotation: Float[Array, "*batch 3 3"]) -> Float[Array, "*b
     """The inverse of rotation_from_vector, with an angle in [0, pi]; safe near both ends."""
     from scipy.spatial.transform import Rotation
 
-    rotation = np.asarray(rotation, dtype=np.float64)
+    # A copy: SciPy takes no array that is read-only.
+    rotation = np.array(rotation, dtype=np.float64)
     vectors: Array = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_rotvec()
     return vectors.reshape(rotation.shape[:-1])
 
