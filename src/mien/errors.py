@@ -2,7 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+
+_UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
+_BYTE = 0xDC00  # where Python puts the bytes of a file's name that are no text
+
+
+def escaped(text: str) -> str:
+    """Text that any file in UTF-8 can hold: bytes that are no text, and what steers terminals,
+    are written as \\xNN.
+    """
+
+    def name(match: re.Match[str]) -> str:
+        code = ord(match[0])
+        code -= _BYTE if _BYTE + 0x80 <= code < _BYTE + 0x100 else 0
+        return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+
+    return _UNPRINTABLE.sub(name, text)
 
 
 class MienError(Exception):
@@ -20,7 +37,7 @@ class InputError(MienError, ValueError):
 
     def __init__(self, name: str | Path, expected: str, got: object) -> None:
         self.name, self.expected, self.got = str(name), expected, str(got)
-        super().__init__(f"{self.name}: expected {expected}, got {self.got}")
+        super().__init__(escaped(f"{self.name}: expected {expected}, got {self.got}"))
 
 
 class FileFormatError(MienError):
@@ -34,7 +51,7 @@ class FileFormatError(MienError):
 
     def __init__(self, path: str | Path, problem: str, place: str = "") -> None:
         self.path, self.place, self.problem = Path(path), place, problem
-        super().__init__(f"{path}: {place + ': ' if place else ''}{problem}")
+        super().__init__(escaped(f"{path}: {place + ': ' if place else ''}{problem}"))
 
 
 class EstimationError(MienError):

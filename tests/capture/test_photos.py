@@ -296,3 +296,9 @@ def test_floating_point_samples(tmp_path: Path) -> None:
 def test_max_side(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="max_side: expected a number above zero"):
         load_photo(tmp_path / "a.jpg", max_side=0)
+
+
+def test_nul_in_a_path() -> None:
+    expected = r"a\\x00\.png: expected a file's name, got one with a NUL"
+    with pytest.raises(InputError, match=expected):
+        load_photo("a\0.png")

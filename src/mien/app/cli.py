@@ -19,9 +19,9 @@ from mien.app.options import (
     parse_size,
     parse_state,
 )
-from mien.app.printing import Json, print_result
+from mien.app.printing import Json, print_result, set_up_streams
 from mien.app.progress import terminal_progress
-from mien.errors import MienError
+from mien.errors import InputError, MienError, escaped
 
 app = typer.Typer(
     help="Photographs of a real person to a textured head.",
@@ -263,10 +263,14 @@ app.command()(synthesize)
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; the console script's entry point. Returns the exit status."""
+    set_up_streams()
     arguments = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in arguments
     arguments = [argument for argument in arguments if argument != "--debug"]
     try:
+        for argument in arguments:
+            if "\0" in argument:
+                raise InputError("arguments", "text without NUL", argument)
         # An interrupted command comes back as its exit status, a finished one as None.
         return app(args=arguments, prog_name="mien", standalone_mode=False) or 0
     except Exception as error:
@@ -284,7 +288,7 @@ def _one_line(error: Exception) -> str:
         text = str(error)
     else:
         text = f"internal error: {type(error).__name__}: {error} (--debug shows where)"
-    return " ".join(text.split())
+    return " ".join(escaped(text).split())
 
 
 def _angle(name: str, degrees: float) -> float:

@@ -18,6 +18,7 @@ from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.detector import LandmarkDetector
 from mien.capture.face_series import FaceSeries, find_faces, load_pictures, row_of, rows_of
+from mien.capture.files import plain_name
 from mien.capture.photos import Photo, load_photo
 from mien.errors import InputError
 from mien.formats.atomic import atomic_folder
@@ -165,7 +166,7 @@ def gather_examples(
     rows = plan.choice.rows.tolist()
     photos = dict(load_pictures(series, rows, partial(tell, FETCHING)))
     plan = plan.with_points(_steady(series, layout, photos, marks, partial(tell, LOOKING)))
-    video = series.source.name if series.is_video else ""
+    video = plain_name(series.source) if series.is_video else ""
     examples, why = build_examples(plan, photos, source=video, even=request.even)
     pictures = dict(zip(plan.names, plan.choice.reasons, strict=True)) | series.left_out
     notes = [*series.notes, *_notes(plan, series, marks), *_set_notes(examples, photos, rows)]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from mien.animate.tracked import track_moments
 from mien.app.explained import units_of
+from mien.capture.files import plain_name
 from mien.errors import InputError
 from mien.formats.atomic import check_file_place
 from mien.formats.live_link import write_live_link
@@ -91,7 +92,7 @@ class TrackFiles:
             write_track_plots(
                 self.plots,
                 track,
-                title=video.name,
+                title=plain_name(video),
                 video=video,
                 head=renderer,
                 progress=partial(tell, PLOTS),

@@ -13,6 +13,7 @@ import numpy as np
 
 from mien.app.ready_head import ReadyHead
 from mien.arrays import Array, UInt8
+from mien.capture.files import plain_name
 from mien.capture.frames_ahead import frames_ahead
 from mien.capture.video import Video, VideoFacts
 from mien.formats.track_journal import Journal, journal_of, load_journal
@@ -70,7 +71,7 @@ class TrackRun:
         path = self.clip.path
         return {
             "generator": f"mien {version('mien')}",
-            "video": {"name": path.name, "bytes": path.stat().st_size},
+            "video": {"name": plain_name(path), "bytes": path.stat().st_size},
             "head": digest(self.ready.head),
             "focal_px": self.focal_px,
             "max_side": self.max_side,

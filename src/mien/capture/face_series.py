@@ -11,6 +11,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8
 from mien.capture.detector import LandmarkDetector, look_twice
+from mien.capture.files import plain_name
 from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
 from mien.capture.frame_choice import FrameScores
 from mien.capture.frame_photos import fetch_frames, frame_name
@@ -145,7 +146,7 @@ class _Gathered:
                     self._add(frame_name(picture.frame), picture.frame, picture.pixels, found)
                 if report is not None:
                     report(picture.frame + 1, max(total, picture.frame + 1))
-        self.notes += [f"{self.source.name}: {note}" for note in video.notes]
+        self.notes += [f"{plain_name(self.source)}: {note}" for note in video.notes]
 
     def read_photos(
         self, detector: LandmarkDetector, face: int | None, report: Report | None
@@ -158,7 +159,7 @@ class _Gathered:
         for folder, paths in folders.items():
             self.notes += orphaned_annotations(paths)
             for path in paths:
-                name = path.name if len(folders) == 1 else f"{folder}/{path.name}"
+                name = plain_name(path) if len(folders) == 1 else f"{folder}/{plain_name(path)}"
                 self._add_photo(name, number, path, detector, face)
                 number += 1
                 if report is not None:

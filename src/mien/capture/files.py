@@ -7,6 +7,8 @@ from pathlib import Path
 
 from mien.errors import FileFormatError, InputError
 
+_PLAINLESS = re.compile(r"[\x00-\x1f\x7f\\\ud800-\udfff]")
+
 
 def check_readable(path: Path, kind: str) -> None:
     """Raises: InputError: no such file, or not allowed. FileFormatError: it is empty."""
@@ -19,8 +21,17 @@ def check_readable(path: Path, kind: str) -> None:
         raise InputError(path, kind, "a folder") from None
     except OSError as error:
         raise InputError(path, f"{kind} that can be read", error.strerror or error) from None
+    except ValueError:
+        raise InputError(path, "a file's name", "one with a NUL in it") from None
     if empty:
         raise FileFormatError(path, f"expected {kind}, found an empty file")
+
+
+def plain_name(path: Path) -> str:
+    """A file's name as every system can write it, within a path too: bytes that are no text,
+    backslashes and control characters become %NN.
+    """
+    return _PLAINLESS.sub(lambda match: f"%{ord(match[0]) & 0xFF:02X}", path.name)
 
 
 def kind_of(path: Path) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from mien.capture.files import listed
+from mien.capture.files import listed, plain_name
 from mien.capture.photos import PHOTO_SUFFIXES
-from mien.errors import InputError
+from mien.errors import InputError, escaped
 
 NEUTRAL = "neutral"
 ANNOTATIONS = "annotations"
@@ -33,7 +33,7 @@ def photo_files(source: Path) -> dict[str, list[Path]]:
 
 def _expression(folder: Path) -> str:
     """A folder's name; `Neutral` is `neutral`, as other stages look for that."""
-    return NEUTRAL if folder.name.lower() == NEUTRAL else folder.name
+    return NEUTRAL if folder.name.lower() == NEUTRAL else plain_name(folder)
 
 
 def ignored_files(source: Path) -> list[str]:
@@ -47,7 +47,7 @@ def ignored_files(source: Path) -> list[str]:
         ignored += [folder for folder in _subfolders(source) if _photos_in(folder)]
     if not ignored:
         return []
-    shown = ", ".join(str(path.relative_to(source)) for path in ignored[:5])
+    shown = ", ".join(escaped(str(path.relative_to(source))) for path in ignored[:5])
     more = ", ..." if len(ignored) > 5 else ""
     return [f"not used, as they are no photos or lie beside photos: {shown}{more}"]
 
@@ -59,7 +59,7 @@ def orphaned_annotations(photos: Sequence[Path]) -> list[str]:
         return []
     stems = {path.stem for path in listed(photos[0].parent)}
     return [
-        f"{ANNOTATIONS}/{path.name}: there is no photo of that name"
+        f"{ANNOTATIONS}/{escaped(path.name)}: there is no photo of that name"
         for path in listed(folder)
         if path.suffix == ".json" and path.stem not in stems
     ]

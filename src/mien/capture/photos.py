@@ -13,7 +13,7 @@ import numpy as np
 
 from mien.arrays import Array, UInt8, check_image, check_positive, frozen
 from mien.capture.exif import focal_prior_px, orientation
-from mien.capture.files import check_readable, kind_of, one_line
+from mien.capture.files import check_readable, kind_of, one_line, plain_name
 from mien.errors import FileFormatError
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def load_photo(path: str | Path, *, max_side: int = MAX_SIDE) -> Photo:
     if scale < 1:
         notes.append(f"scaled from {original[0]}x{original[1]} to {upright.width}x{upright.height}")
     focal = None if focal_per_px is None else focal_per_px * scale
-    return Photo(path.name, path, pixels, focal, original, tuple(notes))
+    return Photo(plain_name(path), path, pixels, focal, original, tuple(notes))
 
 
 def shrunk(pixels: UInt8[Array, "h w 3"], side: int) -> UInt8[Array, "h w 3"]:

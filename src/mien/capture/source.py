@@ -12,6 +12,7 @@ import numpy as np
 from mien.capture.annotations import AnnotationNames, Annotations, load_annotations
 from mien.capture.detector import NO_FACE, LandmarkDetector, NoFaceError
 from mien.capture.duplicates import same_photo
+from mien.capture.files import plain_name
 from mien.capture.folder import (
     ANNOTATIONS,
     ignored_files,
@@ -119,7 +120,7 @@ def load_capture(
             f"{source}: no photo shows a face that can be used ({'; '.join(reasons[:3])})"
         )
     notes = (*reader.notes, *_viewpoint_notes(found))
-    name = source.stem if source.is_file() else source.resolve().name
+    name = plain_name(source.with_suffix("") if source.is_file() else source.resolve())
     return Capture(name, found, notes)
 
 
@@ -168,7 +169,7 @@ class _Reader:
             max_side=self.max_side,
             progress=self.progress,
         )
-        self.notes += [f"{source.name}: {note}" for note in picked.notes]
+        self.notes += [f"{plain_name(source)}: {note}" for note in picked.notes]
         found = {}
         for name, photos in picked.expressions.items():
             views: list[View] = []

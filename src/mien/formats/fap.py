@@ -17,7 +17,7 @@ import numpy as np
 from mien.animate.channels import head_angles
 from mien.arrays import Array, Float, Int, check_array, check_rotation, frozen
 from mien.assets.generic import load_generic_head
-from mien.errors import EstimationError, InputError
+from mien.errors import EstimationError, InputError, escaped
 from mien.formats.atomic import atomic_file
 from mien.formats.fap_table import (
     COUNT,
@@ -150,7 +150,7 @@ def write_fap(
     rows = [check_array(f"frame {i}", row, (COUNT,), dtype=int) for i, row in enumerate(values)]
     if not rows:
         raise InputError(path, "at least one frame to write", "none")
-    title = "_".join((name or Path(path).stem).split()) or "mien"
+    title = "_".join(escaped(name or Path(path).stem).split()) or "mien"
     mask = " ".join("1" if number in MEASURED else "0" for number in range(1, COUNT + 1))
     chosen = np.array(sorted(MEASURED)) - 1
     lines = [f"{FILE_VERSION} {title} {int(fps)} {len(rows)}"]

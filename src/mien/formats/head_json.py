@@ -111,7 +111,8 @@ def get_path(data: Json, key: str, place: str = "") -> str:
 def is_inside(path: str) -> bool:
     """Whether a relative path, with forward slashes, leads to somewhere below its folder."""
     plain = PurePosixPath(path)
-    return bool(path) and not plain.is_absolute() and ".." not in plain.parts and "\\" not in path
+    leaves = plain.is_absolute() or ".." in plain.parts
+    return bool(path) and not leaves and not {"\\", "\0"} & set(path)
 
 
 def views_from_json(data: Json, expression: str) -> tuple[FittedView, ...]:

@@ -44,9 +44,10 @@ def save_obj(
     if surface.texture is None:
         picture = ""
     title = f"# {head.generator}: {' '.join(head.subject.split())}\n"
+    texts = {path: _obj(surface, library), path.with_name(library): _mtl(surface, picture)}
+    # The files name each other, by the bytes of their names.
     contents = {
-        path: (title + _obj(surface, library)).encode(),
-        path.with_name(library): (title + _mtl(surface, picture)).encode(),
+        file: (title + text).encode("utf-8", "surrogateescape") for file, text in texts.items()
     }
     if surface.texture is not None:
         contents[path.with_name(picture)] = encode_image(surface.texture, "PNG")
