@@ -48,6 +48,8 @@ def test_what_is_no_archive_is_told(path: Path, tmp_path: Path) -> None:
         ArrayFile(path)
     with pytest.raises(FileFormatError, match=r"none\.npz: there is no such file"):
         ArrayFile(tmp_path / "none.npz")
+    with pytest.raises(InputError, match=r"expected a readable file, got File name too long"):
+        ArrayFile(tmp_path / ("x" * 300) / "none.npz")  # A place that cannot be looked into.
     with pytest.raises(InputError, match=r"expected a readable file, got a folder"):
         ArrayFile(tmp_path)
 

@@ -20,7 +20,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int
 from mien.errors import FileFormatError
 from mien.limits import LARGEST, MAX_ARRAY_BYTES, MAX_ARRAYS, MAX_ARRAYS_BYTES, MIB
-from mien.reading import check_file
+from mien.reading import check_file, is_missing
 
 _DAMAGED = (
     OSError,
@@ -61,7 +61,7 @@ class ArrayFile:
         self.path = Path(path)
         self._taken = 0
         # A folder or a pipe is damage to the folder that this file belongs to.
-        if not self.path.exists():
+        if is_missing(self.path):
             raise FileFormatError(self.path, "there is no such file")
         check_file(self.path, 2 * MAX_ARRAYS_BYTES)
         try:

@@ -32,6 +32,17 @@ def check_file(path: str | Path, most: int) -> Path:
     return path
 
 
+def is_missing(path: str | Path) -> bool:
+    """Whether nothing is there, as opposed to something that cannot be reached."""
+    try:
+        Path(path).stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return True
+    except (OSError, ValueError):
+        return False
+    return False
+
+
 def read_bytes(path: str | Path, most: int) -> bytes:
     """All of a file. Raises: as check_file; InputError: it cannot be read."""
     path = check_file(path, most)

@@ -114,10 +114,27 @@ class TestFile:
             check_file_place(tmp_path / name)
         assert names(tmp_path) == ["old"]
         assert (tmp_path / "old").read_text() == "old"
+        check_file_place(tmp_path / "folders" / "above" / "new")
+        check_folder_place(tmp_path / "folders" / "above" / "new", replaces=lambda folder: True)
+        assert names(tmp_path) == ["old"]
         with pytest.raises(InputError, match="expected a file's name, got a folder"):
             check_file_place(tmp_path)
         with pytest.raises(InputError, match="expected a place that can be written to, got"):
             check_file_place(tmp_path / "old" / "below")
+
+    @pytest.mark.parametrize("name", ["new", "folders/above/new"])
+    def test_a_place_that_cannot_be_written_is_found_before_the_work(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+    ) -> None:
+        def refused(path: Path, **options: bool) -> None:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+
+        monkeypatch.setattr(Path, "touch", refused)
+        message = f"{name}: expected a place that can be written to, got Permission denied"
+        with pytest.raises(InputError, match=message):
+            check_file_place(tmp_path / name)
+        with pytest.raises(InputError, match=message):
+            check_folder_place(tmp_path / name, replaces=lambda folder: True)
 
     def test_what_is_read_is_not_written_over(self, tmp_path: Path) -> None:
         photo, picture = tmp_path / "a.jpg", tmp_path / "b.png"

@@ -69,6 +69,8 @@ def test_what_is_no_picture_is_refused(tmp_path: Path, pixels: np.ndarray) -> No
 def test_a_file_that_is_no_image_is_named(tmp_path: Path, rng: np.random.Generator) -> None:
     with pytest.raises(FileFormatError, match=r"x\.png: there is no such file"):
         load_image(tmp_path / "x.png")
+    with pytest.raises(FileFormatError, match=r"x\.png: .* that can be read, found File name"):
+        load_image(tmp_path / ("x" * 300) / "x.png")  # A place that cannot be looked into.
     (tmp_path / "x.png").write_text("text")
     with pytest.raises(FileFormatError, match=r"x\.png: expected an image .*, found a text file"):
         load_image(tmp_path / "x.png")

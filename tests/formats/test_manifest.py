@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from mien.errors import InputError
+from mien.formats import atomic
 from mien.formats.atomic import atomic_folder, check_files_apart, check_side_file
 from mien.formats.manifest import MANIFEST, kept_notes, own_files, read_manifest
 
@@ -77,10 +78,118 @@ def test_nothing_kept_is_overwritten_by_the_next(place: Path) -> None:
     }
 
 
+def test_what_comes_while_the_new_folder_is_brought_to_the_disk(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (place / "notes").write_text("mine")
+    brought = atomic._tree_to_disk
+
+    def disturbed(folder: Path) -> None:
+        brought(folder)
+        (place / "late").write_text("mine, too")
+        (place / "other").write_text("saved anew")
+        (place / "other").replace(place / "notes")
+        (place / "a").write_text("changed")
+
+    monkeypatch.setattr(atomic, "_tree_to_disk", disturbed)
+    write(place, {"a": "new"})
+    assert contents(place) == {
+        "a": "new",
+        "notes": "mine",
+        "late": "mine, too",
+        "kept/notes": "saved anew",
+        "kept/a": "changed",
+    }
+
+
+def test_another_run_that_is_done_first_leaves_nothing_to_keep(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    brought = atomic._tree_to_disk
+
+    def disturbed(folder: Path) -> None:
+        monkeypatch.undo()
+        write(place, {"a": "theirs", "b": "theirs"})
+        brought(folder)
+
+    monkeypatch.setattr(atomic, "_tree_to_disk", disturbed)
+    write(place, {"a": "new"})
+    assert contents(place) == {"a": "new"}
+
+
+def test_other_things_that_come_during_the_run(tmp_path: Path) -> None:
+    (tmp_path / "new").mkdir()
+
+    def nothing(folder: Path) -> bool:
+        return False
+
+    def run() -> None:
+        with atomic_folder(tmp_path / "new", replaces=nothing) as folder:
+            (folder / "a").write_text("1")
+            (tmp_path / "new" / "notes").write_text("mine")
+
+    with pytest.raises(InputError, match="a folder with other things in it"):
+        run()
+    assert (tmp_path / "new" / "notes").read_text() == "mine"
+    assert [path.name for path in tmp_path.iterdir()] == ["new"]
+
+
 def test_a_name_that_the_new_folder_needs(place: Path) -> None:
     (place / "c").write_text("mine")
     write(place, {"c": "new"})
     assert contents(place) == {"c": "new", "kept/c": "mine"}
+
+
+def test_folders_and_files_that_stand_in_the_way_of_each_other(place: Path) -> None:
+    (place / "old").unlink()
+    for folder in ("a", "old"):
+        (place / folder).unlink(missing_ok=True)
+        (place / folder).mkdir()
+        (place / folder / "mine").write_text("mine")
+    (place / "deep" / "b").unlink()
+    (place / "deep").rmdir()
+    (place / "deep").write_text("no folder")
+    for _ in range(2):
+        write(place, {"a": "new", "deep/b": "new"})
+        assert contents(place) == {
+            "a": "new",
+            "deep/b": "new",
+            "old/mine": "mine",
+            "kept/a/mine": "mine",
+            "kept/deep": "no folder",
+        }
+
+
+@pytest.mark.parametrize("link", [False, True])
+def test_a_file_that_is_called_kept(place: Path, link: bool) -> None:
+    if link and os.name == "nt":
+        pytest.skip("links want a privilege there")
+    if link:
+        (place / "kept").symlink_to("nowhere")
+    else:
+        (place / "kept").write_text("mine")
+    (place / "a").write_text("changed")
+    write(place, {"a": "new"})
+    assert (place / "kept").is_symlink() == link
+    found = contents(place)
+    assert found.pop("kept", "mine") == "mine"
+    assert found == {"a": "new", "kept-2/a": "changed"}
+
+
+def test_a_folder_with_the_name_of_the_list(place: Path) -> None:
+    (place / MANIFEST).unlink()
+    (place / MANIFEST).mkdir()
+    (place / MANIFEST / "x").write_text("mine")
+    write(place, {"a": "new", "deep/b": "new", "old": "new"})
+    assert read_manifest(place) is not None
+    assert (place / "kept" / MANIFEST / "x").read_text() == "mine"
+
+
+def test_empty_folders_stay(place: Path) -> None:
+    (place / "mine" / "empty").mkdir(parents=True)
+    write(place, {"a": "new"})
+    assert (place / "mine" / "empty").is_dir()
+    assert not (place / "deep").exists()
 
 
 def test_what_people_are_meant_to_change_stays(place: Path) -> None:

@@ -11,12 +11,18 @@ import os
 import shutil
 import stat
 from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from mien.errors import InputError
 from mien.formats.leftovers import put_back, remove_leftovers, temporary_beside
-from mien.formats.manifest import keep_own_files, read_manifest, write_manifest
+from mien.formats.manifest import (
+    Seen,
+    keep_late_files,
+    keep_own_files,
+    read_manifest,
+    write_manifest,
+)
 
 # Failures of the place that is written to; any other is the caller's own and passes through.
 _PLACE_ERRORS = {
@@ -28,6 +34,7 @@ _PLACE_ERRORS = {
     errno.ENAMETOOLONG,
     errno.ENOSPC,
     errno.ENOTDIR,
+    errno.ENOTEMPTY,
     errno.EPERM,
     errno.EROFS,
 }
@@ -35,10 +42,6 @@ _PLACE_ERRORS = {
 
 _NO_SYNC = {errno.EACCES, errno.EPERM, errno.EINVAL, errno.ENOTSUP, errno.EROFS}
 """Of files and folders that cannot be synced, as opposed to a disk that fails."""
-
-
-class _NothingWritten(Exception):
-    """Leaves what is in a place as it was."""
 
 
 @contextmanager
@@ -51,8 +54,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
     """
     target = _target(path)
     with _placing(path, target):
-        if target.exists() and not target.is_file():
-            raise InputError(path, "a file's name", "a folder" if target.is_dir() else "a device")
+        _check_no_folder(path, target)
         target.parent.mkdir(parents=True, exist_ok=True)
         remove_leftovers(target.parent)
         temporary = temporary_beside(target, "tmp")
@@ -69,10 +71,12 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
 def check_file_place(path: str | Path) -> None:
     """Refuse, before any work is done, a place that `atomic_file` could not take.
 
-    Folders above are made. Raises: InputError: as atomic_file.
+    Raises: InputError: as atomic_file.
     """
-    with suppress(_NothingWritten), atomic_file(path):
-        raise _NothingWritten
+    target = _target(path)
+    with _placing(path, target):
+        _check_no_folder(path, target)
+        _try_to_write(target)
 
 
 def check_files_apart(written: Iterable[str | Path], read: Iterable[str | Path] = ()) -> None:
@@ -137,11 +141,14 @@ def atomic_folder(
         try:
             temporary.mkdir()
             yield temporary
+            # What came there in the meantime must not be lost either.
+            check_folder_place(path, replaces=replaces, read=read)
+            seen: Seen | None = None
             if stay is not None:
                 write_manifest(temporary)
-                keep_own_files(target, temporary, stay=stay)
+                seen = keep_own_files(target, temporary, stay=stay)
             _tree_to_disk(temporary)
-            _swap(temporary, target)
+            _swap(temporary, target, seen)
             _to_disk(target.parent)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
@@ -158,6 +165,7 @@ def check_folder_place(
     put_back(target)
     with _placing(path, target):
         if not target.exists():
+            _try_to_write(target)
             return
         if not target.is_dir():
             raise InputError(path, "a folder's name", "a file of that name")
@@ -169,9 +177,27 @@ def check_folder_place(
             if _target(source).is_relative_to(target):
                 found = f"one with {source}" if _target(source) != target else "what is read"
                 raise InputError(path, "a folder that nothing is read from", found)
+        _try_to_write(target)
 
 
-def _swap(new: Path, target: Path) -> None:
+def _check_no_folder(path: str | Path, target: Path) -> None:
+    if target.exists() and not target.is_file():
+        raise InputError(path, "a file's name", "a folder" if target.is_dir() else "a device")
+
+
+def _try_to_write(target: Path) -> None:
+    """Make a file beside it, or where the folders above it would be made, and remove it again."""
+    above = next(folder for folder in target.parents if folder.exists())
+    trial = temporary_beside(above / target.name, "tmp")
+    try:
+        trial.touch(exist_ok=False)
+        trial.unlink()
+    except OSError as error:
+        raise OSError(error.errno, os.strerror(error.errno or 0), str(target)) from error
+
+
+def _swap(new: Path, target: Path, seen: Seen | None) -> None:
+    """Args: seen: given, what is in the old folder and not among this is kept."""
     if not target.exists():
         new.rename(target)
         return
@@ -182,6 +208,8 @@ def _swap(new: Path, target: Path) -> None:
     except BaseException:
         old.rename(target)
         raise
+    if seen is not None:
+        keep_late_files(old, target, seen)
     shutil.rmtree(old, ignore_errors=True)
 
 

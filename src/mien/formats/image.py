@@ -13,6 +13,7 @@ from mien.capture.colour import to_eight_bits
 from mien.capture.images import opened_image
 from mien.errors import FileFormatError, InputError
 from mien.formats.atomic import atomic_file
+from mien.reading import is_missing
 
 _KINDS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
 _MODES = {3: "RGB", 4: "RGBA"}
@@ -94,6 +95,6 @@ def load_image(path: str | Path) -> UInt8[Array, "h w 3"]:
             eight_bits = to_eight_bits(image, []) if image.mode.startswith("I") else image
             return np.asarray(eight_bits.convert("RGB"))
     except InputError as error:
-        missing = not Path(path).exists()
         found = f"expected {error.expected}, found {error.got}"
-        raise FileFormatError(path, "there is no such file" if missing else found) from None
+        problem = "there is no such file" if is_missing(path) else found
+        raise FileFormatError(path, problem) from None

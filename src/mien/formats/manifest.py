@@ -26,6 +26,10 @@ KEPT = "kept"
 _FORMAT, _VERSION = "mien files", 1
 
 
+Seen = frozenset[tuple[str, int, int, int]]
+"""Files by path within a folder, with what tells whether another one came in their place."""
+
+
 @dataclass(frozen=True)
 class Manifest:
     """The files of a folder as mien wrote them.
@@ -72,28 +76,77 @@ def own_files(folder: Path) -> list[str]:
     return [name for name in _in(folder) if not manifest.describes(folder, name)]
 
 
-def keep_own_files(old: Path, new: Path, *, stay: Collection[str] = ()) -> None:
+def keep_own_files(old: Path, new: Path, *, stay: Collection[str] = ()) -> Seen:
     """Bring what is somebody's own from a folder into the one that will replace it.
 
-    Files that mien does not know stay where they are; those that it wrote and somebody changed, or
-    whose names the new folder has taken, go to `kept/`.
+    Files that mien does not know stay where they are, and so do empty folders; files that it wrote
+    and somebody changed, or whose names the new folder has taken, go to `kept/`.
 
     Args:
         old: may be missing. new: with its manifest written.
         stay: paths that people are meant to change: theirs stay, in the place of mien's.
+    Returns: what there was, for keep_late_files.
     """
     if not old.exists():
-        return
+        return frozenset()
+    seen = _seen(old)
     known = (read_manifest(old) or Manifest({})).files
     # Those that mien never knew come first: they have a right to their places, in `kept/`, too.
     for name in sorted(own_files(old), key=known.__contains__):
-        place = new / name
-        if name in stay:
-            place.unlink(missing_ok=True)
-        elif name in known or os.path.lexists(place):
-            place = _free(new / KEPT / name)
-        place.parent.mkdir(parents=True, exist_ok=True)
-        _link(old / name, place)
+        _bring(old, new, name, changed=name in known, over=name in stay)
+    _keep_empty_folders(old, new)
+    return seen
+
+
+def keep_late_files(old: Path, new: Path, seen: Seen) -> None:
+    """Bring what came into a folder, or changed there, while its own files were brought.
+
+    Args:
+        old: moved aside. new: in its place. seen: by keep_own_files.
+    """
+    late = {name for name, *_ in _seen(old) - seen}
+    for name in late.intersection(own_files(old)) if late else ():
+        _bring(old, new, name)
+
+
+def _bring(old: Path, new: Path, name: str, *, changed: bool = False, over: bool = False) -> None:
+    """Args: changed: it is mien's by name. over: it takes the place of mien's."""
+    place = new / name
+    if over:
+        place.unlink(missing_ok=True)
+    elif changed or not _is_free(new, name):
+        place = _kept_place(new, name)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    _link(old / name, place)
+
+
+def _keep_empty_folders(old: Path, new: Path) -> None:
+    for top, folders, names in os.walk(old):
+        name = Path(top).relative_to(old).as_posix()
+        if not (folders or names) and _is_free(new, name):
+            (new / name).mkdir(parents=True)
+
+
+def _is_free(folder: Path, name: str) -> bool:
+    return not (_is_blocked(folder, name) or os.path.lexists(folder / name))
+
+
+def _is_blocked(folder: Path, name: str) -> bool:
+    """Whether something else has the name of a folder that a file is to lie in."""
+    above = [folder / part for part in Path(name).parents][:-1]
+    return any(os.path.lexists(path) and not _is_folder(path) for path in above)
+
+
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()
+
+
+def _kept_place(new: Path, name: str) -> Path:
+    """A free one in `kept/`, in `kept-2/` where that is no folder or holds none of this name."""
+    folder, number = KEPT, 2
+    while _is_blocked(new, f"{folder}/{name}"):
+        folder, number = f"{KEPT}-{number}", number + 1
+    return _free(new / folder / name)
 
 
 def kept_notes(folder: Path) -> tuple[str, ...]:
@@ -120,6 +173,11 @@ def _in(folder: Path) -> Iterator[str]:
             path = Path(top, name).relative_to(folder).as_posix()
             if path != MANIFEST:
                 yield path
+
+
+def _seen(folder: Path) -> Seen:
+    found = ((name, (folder / name).lstat()) for name in _in(folder))
+    return frozenset((name, info.st_ino, info.st_size, info.st_mtime_ns) for name, info in found)
 
 
 def _raised(error: OSError) -> None:
