@@ -40,8 +40,8 @@ def encoded(linear: Array) -> Array:
     return 255 * np.where(linear <= 0.0031308, low, high)
 
 
-def icc_profile(colorants: Array, name: str) -> bytes:
-    """A minimal ICC v2 display profile with a plain gamma curve."""
+def icc_profile(colorants: Array | None, name: str) -> bytes:
+    """A minimal ICC v2 display profile with a plain gamma curve; of grey without colorants."""
 
     def xyz(values: Array) -> bytes:
         return b"XYZ \0\0\0\0" + struct.pack(">3i", *(round(v * 65536) for v in values))
@@ -53,17 +53,19 @@ def icc_profile(colorants: Array, name: str) -> bytes:
         b"desc": description + bytes(-len(description) % 4),
         b"cprt": b"text\0\0\0\0none\0\0\0\0",
         b"wtpt": xyz(np.array([0.9642, 1.0, 0.8249])),
-        b"rXYZ": xyz(colorants[:, 0]),
-        b"gXYZ": xyz(colorants[:, 1]),
-        b"bXYZ": xyz(colorants[:, 2]),
-        **dict.fromkeys((b"rTRC", b"gTRC", b"bTRC"), curve),
     }
+    if colorants is None:
+        tags[b"kTRC"] = curve
+    else:
+        tags |= {f"{letter}XYZ".encode(): xyz(colorants[:, i]) for i, letter in enumerate("rgb")}
+        tags |= dict.fromkeys((b"rTRC", b"gTRC", b"bTRC"), curve)
+    space = b"GRAY" if colorants is None else b"RGB "
     table, body, start = struct.pack(">I", len(tags)), b"", 128 + 4 + 12 * len(tags)
     for tag, data in tags.items():
         table += tag + struct.pack(">II", start + len(body), len(data))
         body += data
     header = struct.pack(
-        ">I4sI4s4s4s", start + len(body), b"none", 0x02400000, b"mntr", b"RGB ", b"XYZ "
+        ">I4sI4s4s4s", start + len(body), b"none", 0x02400000, b"mntr", space, b"XYZ "
     )
     header += bytes(12) + b"acsp" + bytes(28) + struct.pack(">3i", 63190, 65536, 54061) + bytes(48)
     return header + table + body
@@ -195,6 +197,16 @@ def test_sixteen_bits(tmp_path: Path) -> None:
     np.testing.assert_array_equal(photo.pixels, np.dstack([eight // 3, eight // 2, eight]))
 
 
+def test_deep_jpeg_2000_keeps_white(tmp_path: Path) -> None:
+    import cv2
+
+    eight = np.full((32, 40, 3), 255, np.uint8)
+    eight[:, :20] = (10, 100, 200)
+    cv2.imwrite(str(tmp_path / "a.jp2"), eight[:, :, ::-1].astype(np.uint16) * 257)
+    pixels = load_photo(tmp_path / "a.jp2").pixels
+    assert np.abs(pixels.astype(int) - eight)[:, [*range(16), *range(24, 40)]].max() <= 2
+
+
 @pytest.mark.parametrize("mode", ["L", "1", "P"])
 def test_grey_bitmap_and_palette(picture: Array, tmp_path: Path, mode: str) -> None:
     image = Image.fromarray(picture).convert(mode)
@@ -212,6 +224,16 @@ def test_transparency_is_shown_on_white(tmp_path: Path, mode: str) -> None:
     np.testing.assert_array_equal(photo.pixels[:, :2], 255)
     np.testing.assert_array_equal(photo.pixels[:, 2:], 10)
     assert photo.notes == ("transparent parts are shown on white",)
+
+
+@pytest.mark.parametrize("mode", ["L", "LA"])
+@pytest.mark.parametrize("colorants", [None, P3])
+def test_grey_with_a_profile(tmp_path: Path, mode: str, colorants: Array | None) -> None:
+    grey = Image.new("L", (4, 2), 40).convert(mode)
+    grey.save(tmp_path / "a.png", icc_profile=icc_profile(colorants, "Some"))
+    photo = load_photo(tmp_path / "a.png")
+    assert photo.notes == ("colours converted from Some to sRGB",)
+    np.testing.assert_allclose(photo.pixels, encoded(np.array((40 / 255) ** GAMMA)), atol=1.5)
 
 
 def test_transparent_palette(tmp_path: Path) -> None:
@@ -347,7 +369,24 @@ def test_missing_folder_and_forbidden(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_floating_point_samples(tmp_path: Path) -> None:
     Image.fromarray(np.ones((4, 4), np.float32)).save(tmp_path / "a.tif")
-    with pytest.raises(FileFormatError, match="floating-point samples"):
+    expected = r"a\.tif: expected 8 or 16 bits a sample, found floating-point samples"
+    with pytest.raises(FileFormatError, match=expected):
+        load_photo(tmp_path / "a.tif")
+
+
+def test_colour_in_floating_point(tmp_path: Path) -> None:
+    import cv2
+
+    cv2.imwrite(str(tmp_path / "a.tif"), np.ones((4, 4, 3), np.float32))
+    with pytest.raises(FileFormatError, match=r"found something else \(a TIFF of a kind that"):
+        load_photo(tmp_path / "a.tif")
+
+
+@pytest.mark.parametrize(("low", "high"), [(0, 70_000), (-1, 5)])
+def test_thirty_two_bits(tmp_path: Path, low: int, high: int) -> None:
+    Image.fromarray(np.array([[low, high]], np.int32)).save(tmp_path / "a.tif")
+    expected = f"expected 8 or 16 bits a sample, found values from {low} to {high}"
+    with pytest.raises(FileFormatError, match=expected):
         load_photo(tmp_path / "a.tif")
 
 

@@ -210,3 +210,11 @@ def test_a_photo_without_an_ending_in_a_folder(tmp_path: Path) -> None:
     (tmp_path / "b").write_text("no photo")
     assert photo_files(tmp_path) == {"neutral": [tmp_path / "a"]}
     assert ignored_files(tmp_path) == ["not used, as they are no photos or lie beside photos: b"]
+
+
+@pytest.mark.parametrize("ending", ["ppm", "pgm", "pbm", "jp2", "j2k", "jpx", "dib"])
+def test_uncommon_endings_are_photos_in_a_folder(tmp_path: Path, ending: str) -> None:
+    mode = {"pgm": "L", "pbm": "1"}.get(ending, "RGB")
+    Image.new(mode, (8, 8)).save(tmp_path / f"a.{ending.upper()}")
+    assert photo_files(tmp_path) == {"neutral": [tmp_path / f"a.{ending.upper()}"]}
+    assert not ignored_files(tmp_path)

@@ -8,14 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mien.capture.images import UnreadSamplesError
+
 if TYPE_CHECKING:
     from PIL.Image import Image
+
+_SPACE = slice(16, 20)
+"""Where a colour profile says which channels it is for."""
 
 
 def to_eight_bits(image: Image, notes: list[str]) -> Image:
     """The picture in mode L, RGB, CMYK or LAB: 8 bits a sample, no palette, no alpha.
 
-    Raises: ValueError: samples whose range is unknown (floating point).
+    Raises: UnreadSamplesError: samples whose range is unknown (floating point, 32 bits).
     """
     from PIL import Image
 
@@ -23,11 +28,13 @@ def to_eight_bits(image: Image, notes: list[str]) -> Image:
         return image
     if image.mode.startswith("I"):
         # 16-bit grey; 65535 is white, and 65535 / 257 is 255.
-        samples = np.clip(np.asarray(image), 0, 65535).astype(np.uint16)
+        samples = np.asarray(image)
+        if samples.min() < 0 or samples.max() > 65535:
+            raise UnreadSamplesError(f"values from {samples.min()} to {samples.max()}")
         notes.append("16-bit grey: reduced to 8 bits")
         return Image.fromarray((samples // 257).astype(np.uint8))
     if image.mode == "F":
-        raise ValueError("floating-point samples; save the photo with 8 or 16 bits")
+        raise UnreadSamplesError("floating-point samples")
     if image.mode in ("RGBA", "RGBa", "LA", "La", "PA") or "transparency" in image.info:
         return _without_alpha(image, notes)
     return image.convert("L" if image.mode == "1" else "RGB")
@@ -37,13 +44,15 @@ def _without_alpha(image: Image, notes: list[str]) -> Image:
     """Composited onto white, what most viewers show behind a cut-out."""
     from PIL import Image
 
+    # Grey stays grey, as its colour profile may be one of grey.
+    colour = "L" if image.mode[0] == "L" else "RGB"
     rgba = image.convert("RGBA")
     if rgba.getchannel("A").getextrema()[0] == 255:
-        return rgba.convert("RGB")
+        return rgba.convert(colour)
     notes.append("transparent parts are shown on white")
     white = Image.new("RGBA", rgba.size, "white")
     white.alpha_composite(rgba)
-    return white.convert("RGB")
+    return white.convert(colour)
 
 
 def to_srgb(image: Image, profile: bytes | None, notes: list[str]) -> Image:
@@ -55,6 +64,8 @@ def to_srgb(image: Image, profile: bytes | None, notes: list[str]) -> Image:
             source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
             name = ImageCms.getProfileDescription(source).strip()
             if "sRGB" not in name:
+                if image.mode == "L" and profile[_SPACE] == b"RGB ":
+                    image = image.convert("RGB")
                 converted = ImageCms.profileToProfile(
                     image, source, ImageCms.createProfile("sRGB"), outputMode="RGB"
                 )

@@ -18,6 +18,9 @@ _SIGNATURES = (
     (b"\xff\x0a", "JPEG XL"),
     (b"\0\0\0\x0cJXL ", "JPEG XL"),
     (b"PK\3\4", "a ZIP archive"),
+    (b"II*\0", "a TIFF of a kind that is not read, or damaged"),
+    (b"MM\0*", "a TIFF of a kind that is not read, or damaged"),
+    (b"ID3", "music"),
 )
 
 

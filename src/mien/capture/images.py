@@ -37,6 +37,10 @@ starts a program that runs what the file says."""
 EXPECTED = "an image (JPEG, PNG, HEIC, ...)"
 
 
+class UnreadSamplesError(ValueError):
+    """Of an image that is whole, but whose samples are of a kind that is not read."""
+
+
 @contextmanager
 def opened_image(path: str | Path, notes: list[str], *, kind: str = "a photo") -> Iterator[Image]:
     """The file as a Pillow image; whatever goes wrong while it is open becomes one clear line.
@@ -71,6 +75,8 @@ def opened_image(path: str | Path, notes: list[str], *, kind: str = "a photo") -
         except UnidentifiedImageError:
             found = unread_kind(path) or kind_of(path)
             raise FileFormatError(path, f"expected {EXPECTED}, found {found}") from None
+        except UnreadSamplesError as error:
+            raise FileFormatError(path, f"expected 8 or 16 bits a sample, found {error}") from None
         except Exception as error:
             # Decoders raise whatever a damaged byte leads them to.
             problem = f"expected a whole image, found a damaged one ({one_line(error)})"

@@ -19,9 +19,11 @@ if TYPE_CHECKING:
 MAX_SIDE = 4096
 """Longest side, in px, of a photo in memory unless the caller says otherwise."""
 
-_JPEG = (".jpg", ".jpeg", ".jpe", ".jfif", ".mpo", ".jp2")
+_JPEG = (".jpg", ".jpeg", ".jpe", ".jfif", ".mpo")
+_JPEG_2000 = (".jp2", ".jpf", ".jpx", ".j2k", ".j2c", ".jpc")
+_OTHER = (".png", ".tif", ".tiff", ".webp", ".bmp", ".dib", ".gif", ".ppm", ".pgm", ".pbm", ".pnm")
 _HEIF = (".heic", ".heif", ".hif", ".avif")
-PHOTO_SUFFIXES = frozenset((*_JPEG, *_HEIF, ".png", ".tif", ".tiff", ".webp", ".bmp", ".gif"))
+PHOTO_SUFFIXES = frozenset((*_JPEG, *_JPEG_2000, *_HEIF, *_OTHER))
 """Endings (lower case) by which a folder's photos are told from its other files."""
 
 
@@ -123,6 +125,7 @@ def _shrunk_rgb(image: Image, max_side: int, notes: list[str]) -> Image:
     from PIL import Image
 
     from mien.capture.colour import from_hdr, to_eight_bits, to_srgb
+    from mien.capture.deep_jpeg2000 import eight_bits_if_deep
 
     factor = min(1.0, max_side / max(image.size))
     target = max(1, round(image.width * factor)), max(1, round(image.height * factor))
@@ -133,7 +136,7 @@ def _shrunk_rgb(image: Image, max_side: int, notes: list[str]) -> Image:
         notes.append(f"holds {getattr(image, 'n_frames', 1)} pictures: the first is used")
     image.load()
     profile, coded = image.info.get("icc_profile"), image.info.get("nclx_profile") or {}
-    eight_bits = to_eight_bits(image, notes)
+    eight_bits = eight_bits_if_deep(image) or to_eight_bits(image, notes)
     if eight_bits.size != target and factor < 1:
         eight_bits = eight_bits.resize(target, Image.Resampling.LANCZOS, reducing_gap=2.0)
     return from_hdr(to_srgb(eight_bits, profile, notes), {} if profile else coded, notes)
