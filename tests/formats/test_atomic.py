@@ -238,3 +238,10 @@ class TestFolder:
             atomic_folder(tmp_path / "file" / "result", replaces=always),
         ):
             pass
+
+
+@pytest.mark.parametrize("name", ["", "a\0b"])
+def test_names_that_are_none(name: str) -> None:
+    for check in (check_file_place, lambda name: check_folder_place(name, replaces=always)):
+        with pytest.raises(InputError, match="expected where a result goes, got a"):
+            check(name)

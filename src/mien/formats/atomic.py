@@ -14,6 +14,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from mien.capture.files import named_path
 from mien.errors import InputError
 from mien.formats.leftovers import put_back, remove_leftovers, temporary_beside
 from mien.formats.manifest import (
@@ -215,7 +216,7 @@ def _swap(new: Path, target: Path, seen: Seen | None) -> None:
 
 def _target(path: str | Path) -> Path:
     """Where a link leads: the link stays and what it names is replaced."""
-    return Path(os.path.realpath(path))
+    return Path(os.path.realpath(named_path("output", path, "where a result goes")))
 
 
 def _is_same(one: Path, other: Path) -> bool:
