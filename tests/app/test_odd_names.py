@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import os
 import shutil
 import sys
@@ -97,6 +98,12 @@ def test_bars_on_terminals_that_know_ascii_only(monkeypatch: pytest.MonkeyPatch)
     with terminal_progress(quiet=False) as progress:
         progress("Zähne", 1, 2)
     assert "Z\\xe4hne" in written(err)
+
+
+def test_what_matplotlib_says_of_its_folders_stays_out(capfd: pytest.CaptureFixture[str]) -> None:
+    set_up_streams()
+    logging.getLogger("matplotlib").warning("created a temporary cache directory")
+    assert capfd.readouterr().err == ""
 
 
 def test_what_is_wrong_with_such_a_name_is_said(mien: Mien, tmp_path: Path) -> None:

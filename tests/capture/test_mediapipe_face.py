@@ -39,6 +39,18 @@ def test_messages_before_an_error_pass(capfd: pytest.CaptureFixture[str]) -> Non
     assert capfd.readouterr().err == "F0000 the reason\n"
 
 
+def test_without_a_place_for_temporary_files(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def refused() -> None:
+        raise FileNotFoundError("No usable temporary directory found")
+
+    monkeypatch.setattr("tempfile.TemporaryFile", refused)
+    with _quiet_stderr():
+        os.write(2, b"said\n")
+    assert capfd.readouterr().err == "said\n"
+
+
 def test_blendshape_names_are_the_networks(faces: dict[str, Array]) -> None:
     with FaceNetwork(detector_model_path()) as network:
         mediapipe = network._mediapipe

@@ -239,6 +239,21 @@ def test_a_failure_leaves_all_as_it_was(place: Path) -> None:
 
 
 class TestWhatIsRead:
+    @pytest.mark.skipif(os.name == "nt", reason="links want a privilege there")
+    @pytest.mark.parametrize("name", ["b.jpg", "joy/b.jpg", "joy"])
+    def test_a_source_with_links_into_the_folder(
+        self, place: Path, tmp_path: Path, name: str
+    ) -> None:
+        link = tmp_path / "photos" / name
+        link.parent.mkdir(parents=True)
+        link.symlink_to(place / "deep" / "b")
+        message = f"a folder that nothing is read from, got one with {link}"
+        with (
+            pytest.raises(InputError, match=message),
+            atomic_folder(place, replaces=always, read=[tmp_path / "photos"]),
+        ):
+            pass
+
     def test_a_source_in_the_folder(self, place: Path) -> None:
         (place / "mine").mkdir()
         for source in (place, place / "mine", place / "notes.txt"):

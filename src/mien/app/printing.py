@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import sys
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -56,7 +57,11 @@ def print_result(
 
 
 def set_up_streams() -> None:
-    """From here on, no character stops a line: what a terminal cannot show is escaped."""
+    """From here on, no character stops a line: what a terminal cannot show is escaped.
+
+    What Matplotlib, which MediaPipe imports, says of folders where it keeps fonts stays out.
+    """
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

@@ -7,7 +7,7 @@ import re
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -212,13 +212,15 @@ def _quiet_stderr() -> Iterator[None]:
     It is written by C++ straight to file descriptor 2 before any option of MediaPipe's can take
     effect, hence the redirection.
     """
-    try:
-        sys.stderr.flush()
-        saved = os.dup(2)
-    except (AttributeError, OSError, ValueError):
-        yield
-        return
-    with tempfile.TemporaryFile() as kept:
+    with ExitStack() as stack:
+        try:
+            sys.stderr.flush()
+            # There may be no place for such a file on a read-only system.
+            kept = stack.enter_context(tempfile.TemporaryFile())
+            saved = os.dup(2)
+        except (AttributeError, OSError, ValueError):
+            yield
+            return
         os.dup2(kept.fileno(), 2)
         try:
             yield

@@ -174,11 +174,18 @@ def check_folder_place(
             raise InputError(
                 path, "a new folder or one made by mien", "a folder with other things in it"
             )
-        for source in read:
+        for source in (link for given in read for link in _with_links(Path(given))):
             if _target(source).is_relative_to(target):
                 found = f"one with {source}" if _target(source) != target else "what is read"
                 raise InputError(path, "a folder that nothing is read from", found)
         _try_to_write(target)
+
+
+def _with_links(source: Path) -> Iterator[Path]:
+    """What is read, and the links in it, as deep as photos lie."""
+    yield source
+    for pattern in ("*", "*/*"):
+        yield from (path for path in source.glob(pattern) if path.is_symlink())
 
 
 def _check_no_folder(path: str | Path, target: Path) -> None:
