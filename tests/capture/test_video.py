@@ -8,6 +8,7 @@ import av
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from filmed import broken, flagged, grey, shown_by, written
 from mien.arrays import Array
@@ -196,3 +197,10 @@ def test_no_frame_that_can_be_decoded(tmp_path: Path) -> None:
     path.write_bytes(data[:begin] + bytes(end - begin) + data[end:])
     with pytest.raises(FileFormatError, match=r"a\.mp4: expected a video, found no frame"):
         list(Video(path).frames())
+
+
+@pytest.mark.parametrize("ending", ["jpg", "webp"])
+def test_a_photo_is_named_as_one(tmp_path: Path, ending: str) -> None:
+    Image.new("RGB", (8, 8)).save(tmp_path / f"a.{ending}")
+    with pytest.raises(FileFormatError, match=rf"a\.{ending}: expected a video, found a photo$"):
+        next(Video(tmp_path / f"a.{ending}").frames())

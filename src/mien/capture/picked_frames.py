@@ -82,7 +82,8 @@ def pick_frames(
     video.notes.append(f"{len(neutral)} of {len(scores.index)} judged frames chosen: {span}")
     others = [name for name in rows if name != NEUTRAL]
     if others:
-        video.notes.append(f"{len(others)} other expressions chosen: {', '.join(others)}")
+        what = f"other expression{'s' * (len(others) > 1)} chosen"
+        video.notes.append(f"{len(others)} {what}: {', '.join(others)}")
     return PickedFrames(picked, tuple(video.notes))
 
 

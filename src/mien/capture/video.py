@@ -14,7 +14,7 @@ from mien.arrays import Array, UInt8, UInt16
 from mien.capture.display import Display, display_of
 from mien.capture.files import check_readable, kind_of, one_line
 from mien.capture.hdr import HDR, to_srgb
-from mien.capture.images import MAX_PIXELS
+from mien.capture.images import MAX_PIXELS, is_image
 from mien.errors import FileFormatError
 
 if TYPE_CHECKING:
@@ -213,7 +213,8 @@ def _open(path: Path) -> InputContainer:
         # Without "file:" a name like "concat:a" would be an address.
         return av.open(f"file:{path}", container_options=_OPTIONS, **lenient)  # type: ignore[call-overload,no-any-return]
     except av.FFmpegError as error:
-        found = f"{kind_of(path)} ({one_line(error.strerror or error)})"
+        reason = one_line(error.strerror or error)
+        found = "a photo" if is_image(path) else f"{kind_of(path)} ({reason})"
         raise FileFormatError(path, f"expected a video, found {found}") from None
 
 
