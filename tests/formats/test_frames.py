@@ -84,3 +84,10 @@ def test_frames_are_not_made_over_what_they_are_made_from(tmp_path: Path) -> Non
     write_frames(tmp_path / "out", pictures(1))
     with pytest.raises(InputError, match="a folder that nothing is read from"):
         check_frames_place(tmp_path / "out", read=[tmp_path / "out" / "take.json"])
+
+
+def test_what_file_managers_leave_is_no_other_thing(tmp_path: Path) -> None:
+    for _ in range(2):
+        assert write_frames(tmp_path / "out", pictures(2)) == 2
+        assert not (tmp_path / "out" / ".DS_Store").exists()
+        (tmp_path / "out" / ".DS_Store").write_bytes(b"view")

@@ -11,6 +11,9 @@ from mien.errors import InputError
 from mien.formats.atomic import atomic_folder, check_folder_place
 from mien.formats.image import encode_image, is_drawn_png
 
+_OF_THE_SYSTEM = {".DS_Store", "Thumbs.db", "desktop.ini"}
+"""Left by file managers in every folder that they show; nobody misses them."""
+
 
 def write_frames(
     path: str | Path,
@@ -57,6 +60,7 @@ def check_frames_place(path: str | Path, *, read: Iterable[str | Path] = ()) -> 
 
 def _holds_frames(folder: Path) -> bool:
     """Whether everything in a folder is a frame of one sequence, and mien drew it."""
-    names = [re.fullmatch(r"([\w-]+)_\d{6}\.png", item.name) for item in folder.iterdir()]
+    items = [item for item in folder.iterdir() if item.name not in _OF_THE_SYSTEM]
+    names = [re.fullmatch(r"([\w-]+)_\d{6}\.png", item.name) for item in items]
     one_sequence = all(names) and len({match[1] for match in names if match}) <= 1
-    return one_sequence and all(map(is_drawn_png, folder.iterdir()))
+    return one_sequence and all(map(is_drawn_png, items))
