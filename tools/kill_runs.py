@@ -1,12 +1,12 @@
 """Kill mien's commands at random moments and look at what is left.
 
-    python -m tools.kill_runs [-n 200] [--seed 1]
+    python -m tools.kill_runs [-n 200] [--seed 1] [--only animate]
 
 Six commands that write files and folders are run on a small head, each several times to its end, so
 that the result to replace is there, and then again and again until a signal stops it: most often
 SIGKILL, sometimes SIGTERM or SIGINT; half of the time as soon as something is being written. After
-each the result must be whole: the old one or the new one, byte for byte. After the next run that
-ends by itself nothing but the result may lie in the folder.
+each the result must be whole: the old one or the new one, byte for byte (of videos, every frame).
+After the next run that ends by itself nothing but the result may lie in the folder.
 """
 
 from __future__ import annotations
@@ -65,13 +65,28 @@ class Case:
 
 
 def digest(path: Path) -> str:
-    """Of a file, or of a folder's files and their names; "" where there is nothing."""
+    """Of a file, or of a folder's files and their names; "" where there is nothing.
+
+    Of videos the frames are counted: their bytes differ from run to run (docs/reference/limits.md).
+    """
     files = sorted(path.rglob("*")) if path.is_dir() else [path] if path.exists() else []
     hashed = sha256()
     for file in files:
         if file.is_file():
-            hashed.update(str(file.relative_to(path.parent)).encode() + file.read_bytes())
+            content = frames_in(file) if file.suffix == ".mp4" else file.read_bytes()
+            hashed.update(str(file.relative_to(path.parent)).encode() + content)
     return hashed.hexdigest() if files else ""
+
+
+def frames_in(video: Path) -> bytes:
+    """How many frames of a video can be decoded, as bytes; why not, where it is none."""
+    import av
+
+    try:
+        with av.open(video) as container:
+            return str(sum(1 for _ in container.decode(video=0))).encode()
+    except av.FFmpegError as error:
+        return str(error).encode()
 
 
 def cases(place: Path) -> list[Case]:
@@ -159,10 +174,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-n", type=int, default=200, help="kills in all")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", help="one of the commands alone")
     options = parser.parse_args()
     rng = random.Random(options.seed)
     with scratch() as place:
-        rows = cases(place)
+        rows = [case for case in cases(place) if options.only in (None, case.name)]
         for case in rows:
             folder = place / f"out-{case.name}"
             folder.mkdir()
