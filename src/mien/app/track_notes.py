@@ -8,6 +8,7 @@ from statistics import median
 import numpy as np
 
 from mien.app.head_in_photo import UNLIKE
+from mien.arrays import Array, Float
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
 from mien.capture.landmarks import is_cut
@@ -30,7 +31,8 @@ def track_notes(track: Track, head: Head, *, met_others: bool) -> list[str]:
     if lost:
         why = f"; {_OTHERS}" if met_others else ""
         notes.append(f"the face is lost in {_counted(lost, track)}{why}")
-    cut = [frame for frame in track.frames if _is_cut(frame, track, head)]
+    places = load_generic_head().landmark_positions(head.mesh.vertices)
+    cut = [frame for frame in track.frames if _is_cut(frame, track, places)]
     if cut:
         notes.append(f"the edge cuts the face in {_counted(cut, track)}; outside is a guess")
     errors = [frame.rms for frame in track.frames if frame.state is not None]
@@ -55,13 +57,12 @@ def _counted(frames: list[TrackedFrame], track: Track) -> str:
     return f"{len(frames)} of {len(track.frames)} frames, at {frames[0].time:.2f} s first"
 
 
-def _is_cut(frame: TrackedFrame, track: Track, head: Head) -> bool:
+def _is_cut(frame: TrackedFrame, track: Track, places: Float[Array, "n 3"]) -> bool:
     """Whether the head's landmarks, its face at rest, lie outside of the picture."""
     if frame.state is None:
         return False
     size = (track.width, track.height)
     state = frame.state
     camera = Camera(*size, track.focal_px, state.R_cam_head, state.t_cam_head)
-    places = load_generic_head().landmark_positions(head.mesh.vertices)
     in_front = camera.to_camera(places)[:, 2] > 0
     return bool(in_front.all()) and is_cut(np.asarray(camera.project(places)), size)
