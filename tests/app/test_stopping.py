@@ -50,7 +50,11 @@ def test_while_it_writes(stop: signal.Signals, built: Built, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_in_its_first_moments(stop: signal.Signals, tmp_path: Path) -> None:
-    """While mien's own modules load, too. Python itself takes some 20 ms to start before them."""
+    """While mien's own modules load, too. Python itself takes some 20 ms to start before them.
+
+    Where the stop falls into source text that a library executes (a named tuple's or a data
+    class's), Python 3.11 ends by SIGINT although the interrupt was caught: a shell says 130 to both.
+    """
     for delay in (0.06, 0.1, 0.2):
         run = started("build", tmp_path / "absent", "-o", tmp_path / "head")
         time.sleep(delay)
@@ -58,7 +62,7 @@ def test_in_its_first_moments(stop: signal.Signals, tmp_path: Path) -> None:
         out, err = run.communicate()
         assert out == ""
         assert "Traceback" not in err or "mien/__main__.py" not in err
-        assert run.returncode in (130, -stop, 2)
+        assert run.returncode in (130, -signal.SIGINT, -stop, 2)
     assert list(tmp_path.iterdir()) == []
 
 
