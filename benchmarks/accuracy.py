@@ -16,7 +16,7 @@ from benchmarks.scan import DATA, Scan, SurfaceError, load_scan
 from benchmarks.table import markdown_table, write_results
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.capture.source import load_capture
-from mien.model.fit import FitOptions, fit_views
+from mien.reconstruction.fit import FitOptions, fit_views
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 

@@ -6,14 +6,14 @@ import numpy as np
 
 from benchmarks.scenes import Scene
 from mien.arrays import Array
-from mien.model.bundle import (
+from mien.numeric.solvers.robust import loss_named
+from mien.reconstruction.bundle.problem import (
     POSE_SIZE,
     Bundle,
     BundleData,
     linearize_bundle,
     similarity_constraints,
 )
-from mien.numeric.robust import loss_named
 
 __all__ = ["within_shares"]
 

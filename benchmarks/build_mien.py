@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 from benchmarks.stages import Stages, peak_mb, report
 
 if TYPE_CHECKING:
-    from mien.build import Build
+    from mien.pipelines.build import Build
 
-LANDMARKS, RESULT = "landmarks.npz", "mien.npz"
+LANDMARKS, RESULT = "landmarks.npz", "mien.reading.npz"
 USED_ABOVE = 0.1
 """Less confident landmarks are neither given to the peer nor compared; nor does mien use them."""
 
 
 def main(photos: Path, folder: Path) -> None:
     """Photos to a head folder and a `.glb`, stage by stage; then what the comparison needs."""
-    from mien.build import build_head_folder
-    from mien.formats.export import export_head
+    from mien.io.mesh.export import export_head
+    from mien.pipelines.build import build_head_folder
 
     stages = Stages()
     built = build_head_folder(photos, folder / "head", progress=lambda stage, *_: stages.lap(stage))

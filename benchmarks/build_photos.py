@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mien.app.demo import demo_photos
-from mien.build import build_head
-from mien.formats.image import save_image
-from mien.model.head import ATLAS
+from mien.head import ATLAS
+from mien.io.files.image import save_image
+from mien.pipelines.build import build_head
+from mien.pipelines.demo import demo_photos
 from mien.render.orbit import orbit_camera
 from mien.render.shade import render
 

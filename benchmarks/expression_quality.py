@@ -30,12 +30,12 @@ from benchmarks.table import write_results
 from benchmarks.track_clips import CLIPS
 from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import load_feature_layout
-from mien.capture.detector import LandmarkDetector
-from mien.formats.image import save_image
-from mien.synthesis.choose import COUNT
-from mien.synthesis.coefficients import BROWS, UPPER_FACE, coefficients
-from mien.synthesis.compose import Composer
-from mien.synthesis.examples import ExampleSet
+from mien.capture.faces.detector import LandmarkDetector
+from mien.io.files.image import save_image
+from mien.synthesis.composition.composer import Composer
+from mien.synthesis.examples.example_set import ExampleSet
+from mien.synthesis.examples.selection import COUNT
+from mien.synthesis.inference.coefficients import BROWS, UPPER_FACE, coefficients
 
 Shares = Callable[[ExampleSet, Array], Array]
 """A set and points, px: each subregion's shares of its examples."""

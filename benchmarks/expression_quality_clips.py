@@ -11,14 +11,14 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, Int, UInt8
 from mien.assets.feature_points import FeatureLayout
 from mien.assets.subregions import default_subregions
-from mien.capture.detector import LandmarkDetector
-from mien.capture.mediapipe_face import yaw_pitch
-from mien.capture.sharpness import face_sharpness
-from mien.capture.video import Video
-from mien.synthesis.choose import ExampleCandidates, choose_examples
-from mien.synthesis.examples import Example, ExampleSet
-from mien.synthesis.motion import compensated
-from mien.synthesis.steady import steady_points
+from mien.capture.faces.detector import LandmarkDetector
+from mien.capture.faces.mediapipe_face import yaw_pitch
+from mien.capture.faces.sharpness import face_sharpness
+from mien.capture.video.video import Video
+from mien.synthesis.examples.example_set import Example, ExampleSet
+from mien.synthesis.examples.head_alignment import compensated
+from mien.synthesis.examples.landmark_averaging import steady_points
+from mien.synthesis.examples.selection import ExampleCandidates, choose_examples
 
 __all__ = [
     "FilmedFace",

@@ -19,15 +19,15 @@ from benchmarks.table import markdown_table, write_results
 from benchmarks.track_clips import CLIPS
 from benchmarks.track_runs import follow
 from mien.arrays import Array, Float, UInt8
-from mien.capture.detector import LandmarkDetector
-from mien.capture.video import Video
-from mien.expressions.state import PosedFace
-from mien.formats.head_folder import load_head
-from mien.model.head import Head
+from mien.capture.faces.detector import LandmarkDetector
+from mien.capture.video.video import Video
+from mien.head import Head
+from mien.io.head.head_folder import load_head
 from mien.render.picture import HeadRenderer
-from mien.report.likeness import face_pixels, face_psnr
-from mien.synthesis.head_points import feature_points_on
-from mien.synthesis.head_synthesizer import HeadSynthesizer
+from mien.report.track.comparison import face_pixels, face_psnr
+from mien.rig.state import PosedFace
+from mien.synthesis.heads.points import feature_points_on
+from mien.synthesis.heads.synthesizer import HeadSynthesizer
 from mien.synthesis.synthesizer import SynthesisOptions
 from mien.track.lens import expected_focal
 from mien.track.state import Track, TrackedFrame

@@ -6,8 +6,8 @@ import numpy as np
 import trimesh
 
 from mien.arrays import Array, Float, Int, frozen
-from mien.numeric.jit import njit
-from mien.numeric.threads import for_row_bands
+from mien.numeric.kernels.jit import njit
+from mien.numeric.kernels.threads import for_row_bands
 
 _LEAF = 4
 _WORK = 100

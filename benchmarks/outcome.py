@@ -22,7 +22,7 @@ from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.source import View
-from mien.model.fit import Fit
+from mien.reconstruction.fit import Fit
 
 __all__ = ["Outcome", "cameras_by_stem", "outcome_of", "without_marks"]
 

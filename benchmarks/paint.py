@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int, UInt8
 from mien.camera import Camera
 from mien.mesh import Mesh
-from mien.numeric.sample import sample_bilinear
+from mien.numeric.images.sampling import sample_bilinear
 
 __all__ = ["Hits", "Paint", "ProjectedPaint", "Projector", "TexturePaint"]
 

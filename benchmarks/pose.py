@@ -14,9 +14,9 @@ from benchmarks.scenes import FeatureHead, Scene, generic_features, long_lens_pa
 from benchmarks.table import markdown_table, write_results
 from mien.arrays import Array, Float
 from mien.camera import Camera
-from mien.model.adjust import Adjustment, FocalPrior, adjust_bundle
-from mien.model.pose import PoseResult, recover_pose
 from mien.numeric.rotation import rotation_from_vector
+from mien.reconstruction.bundle.adjustment import Adjustment, FocalPrior, adjust_bundle
+from mien.reconstruction.pose.recovery import PoseResult, recover_pose
 
 DEGREES, RELATIVE = 0.3, 0.05
 """What counts as recovered: rotation and focal length."""

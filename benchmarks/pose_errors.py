@@ -10,10 +10,10 @@ import numpy as np
 from benchmarks.scenes import FeatureHead, Scene
 from mien.arrays import Array, Float
 from mien.camera import Camera
-from mien.model.adjust import Adjustment, FocalPrior, adjust_bundle
-from mien.model.pose import PoseResult, recover_pose
 from mien.numeric.rotation import angle_between
 from mien.numeric.similarity import estimate_similarity
+from mien.reconstruction.bundle.adjustment import Adjustment, FocalPrior, adjust_bundle
+from mien.reconstruction.pose.recovery import PoseResult, recover_pose
 
 __all__ = ["Errors", "adjust", "angle_error", "focal_prior", "measure", "recover"]
 

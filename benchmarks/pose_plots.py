@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.pose_errors import adjust, recover
 from benchmarks.scenes import FeatureHead, generic_features, long_lens_pair, random_scene
-from mien.model.pose import recover_pose
 from mien.numeric.rotation import angle_between
+from mien.reconstruction.pose.recovery import recover_pose
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 PLAIN, FAST = "#7a8ca3", "#c2410c"

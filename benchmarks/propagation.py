@@ -18,10 +18,10 @@ from benchmarks.table import markdown_table, write_results
 from benchmarks.track_clips import CLIPS
 from mien.arrays import Array, Float
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
-from mien.capture.detector import LandmarkDetector
-from mien.synthesis.conditional import ConditionalMotion
-from mien.synthesis.inferred import Inference
-from mien.synthesis.propagate import COMPONENTS, Propagation
+from mien.capture.faces.detector import LandmarkDetector
+from mien.synthesis.inference.conditional import ConditionalMotion
+from mien.synthesis.inference.inferred import Inference
+from mien.synthesis.inference.propagation import COMPONENTS, Propagation
 
 NAMES = ("d10", "d6")
 GIVEN = 17

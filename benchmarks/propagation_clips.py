@@ -9,9 +9,9 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int
 from mien.assets.feature_points import FeatureLayout
-from mien.capture.detector import LandmarkDetector
-from mien.capture.video import Video
-from mien.synthesis.motion import compensated
+from mien.capture.faces.detector import LandmarkDetector
+from mien.capture.video.video import Video
+from mien.synthesis.examples.head_alignment import compensated
 
 __all__ = ["KNOWN", "HeldOut", "held_out", "known_points", "most_different"]
 

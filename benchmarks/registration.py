@@ -31,7 +31,7 @@ from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.capture.source import View, load_capture
 from mien.errors import EstimationError
-from mien.model.fit import Fit, FitOptions, fit_views
+from mien.reconstruction.fit import Fit, FitOptions, fit_views
 
 WINDOW = 4
 QUICK = ("James, 2 photos", "james-5", "person-1")

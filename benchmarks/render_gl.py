@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.render_scene import Scene, arguments, build_scene, measure
 from mien.arrays import Array
-from mien.expressions.state import PosedFace
+from mien.rig.state import PosedFace
 
 SECONDS = 6.0
 NEAR, FAR = 100.0, 5000.0

@@ -15,10 +15,10 @@ from benchmarks.stages import peak_mb
 from mien.arrays import Array, UInt8
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
-from mien.expressions.state import PosedFace
 from mien.mesh import Mesh
 from mien.render.orbit import orbit_camera
 from mien.render.shade import shown_parts
+from mien.rig.state import PosedFace
 
 FACES = 40
 

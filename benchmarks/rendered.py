@@ -21,7 +21,7 @@ from benchmarks.subjects import Subject, emily, james, person
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
-from mien.formats.image import save_image
+from mien.io.files.image import save_image
 from mien.numeric.rotation import rotation_from_vector
 from mien.render.shade import rasterize_mesh
 

@@ -10,8 +10,8 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
-from mien.model.adjust import ShapePrior
 from mien.numeric.rotation import rotation_from_vector
+from mien.reconstruction.bundle.adjustment import ShapePrior
 
 __all__ = [
     "FeatureHead",

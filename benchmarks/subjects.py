@@ -16,12 +16,12 @@ from benchmarks.paint import Paint, ProjectedPaint, Projector, TexturePaint
 from benchmarks.scan import DATA, load_scan, scan_mesh
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
-from mien.build import BuildOptions, build_head
 from mien.camera import Camera
-from mien.capture.photos import load_photo
+from mien.capture.images.photos import load_photo
+from mien.head import ATLAS
 from mien.mesh import Mesh
-from mien.model.head import ATLAS
-from mien.numeric.raster import interpolate
+from mien.numeric.raster.rasterizer import interpolate
+from mien.pipelines.build import BuildOptions, build_head
 from mien.render.shade import rasterize_mesh, shown_parts
 
 __all__ = ["Subject", "emily", "james", "person", "person_vertices", "projector", "smooth_field"]

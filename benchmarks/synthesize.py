@@ -20,9 +20,9 @@ from benchmarks.table import markdown_table, write_results
 from mien.arrays import Array
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
-from mien.synthesis.coefficients import coefficients
-from mien.synthesis.compose import Composer
-from mien.synthesis.examples import Example, ExampleSet
+from mien.synthesis.composition.composer import Composer
+from mien.synthesis.examples.example_set import Example, ExampleSet
+from mien.synthesis.inference.coefficients import coefficients
 
 SIZE, EXAMPLES, CORES = (600, 800), 10, 2
 MANY, LARGE = (10, 20, 40, 80), (1080, 1920)

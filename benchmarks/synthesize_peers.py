@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from mien.arrays import Array
-from mien.synthesis.examples import ExampleSet
+from mien.synthesis.examples.example_set import ExampleSet
 
 __all__ = ["mixed_by_numpy", "opencv_warp", "skimage_warp"]
 

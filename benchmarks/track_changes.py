@@ -10,8 +10,8 @@ import numpy as np
 from benchmarks.track_scenes import Performance
 from mien.arrays import Array, Bool, Float, UInt8
 from mien.assets.generic import load_generic_head
-from mien.expressions.rig import Rig
 from mien.render.shade import rasterize_mesh
+from mien.rig.rig import Rig
 
 __all__ = ["Change", "changes", "covering", "face_masks"]
 

@@ -17,16 +17,16 @@ from benchmarks.track_runs import Followed, follow
 from benchmarks.track_still import Jitter, frame_motion, jitter, still_frames
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import load_generic_head
-from mien.capture.detector import LandmarkDetector
-from mien.capture.landmarks import facing_confidence
-from mien.capture.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace
-from mien.capture.video import Video
-from mien.formats.head_folder import load_head
-from mien.model.head import Head
+from mien.capture.faces.detector import LandmarkDetector
+from mien.capture.faces.landmarks import facing_confidence
+from mien.capture.faces.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace
+from mien.capture.video.video import Video
+from mien.head import Head
+from mien.io.head.head_folder import load_head
 from mien.render.picture import HeadRenderer
-from mien.report.likeness import draw_tracked, face_psnr
-from mien.report.track_series import series_of
-from mien.track.smooth import smooth
+from mien.report.track.comparison import draw_tracked, face_psnr
+from mien.report.track.series import series_of
+from mien.track.smoothing import smooth
 from mien.track.state import Track
 
 VIDEOS = DATA / "videos"

@@ -1,4 +1,4 @@
-"""How far a track's faces lie from the true ones (its poses: mien.report.track_series)."""
+"""How far a track's faces lie from the true ones (its poses: mien.report.track.series)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mien.arrays import Array, Float
-from mien.expressions.rig import Rig
+from mien.rig.rig import Rig
 from mien.track.state import Track, TrackState
 
 __all__ = ["shape_errors", "weight_errors"]

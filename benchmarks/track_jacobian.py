@@ -16,18 +16,18 @@ import numpy as np
 from benchmarks.table import markdown_table
 from benchmarks.track_scenes import Performance, choose_three, cluttered, perform, with_expressions
 from mien.arrays import Array, Float
-from mien.formats.head_folder import load_head
+from mien.io.head.head_folder import load_head
 from mien.numeric.rotation import angle_between
-from mien.track.colours import Colours
-from mien.track.differences import by_differences, unknowns_named
-from mien.track.drawing import Pose
-from mien.track.equations import Equations
-from mien.track.face import FaceParameters, TrackedFace
-from mien.track.flows import POSE_UNKNOWNS
-from mien.track.guess import Belief, Guess
-from mien.track.looks import Linearize, Look, Pictures, Scene, by_bands
-from mien.track.phases import solve
-from mien.track.views import View, cut_views
+from mien.track.face_model import FaceParameters, TrackedFace
+from mien.track.image.colour_gain import Colours
+from mien.track.image.drawing import Pose
+from mien.track.image.frame_pyramid import View, cut_views
+from mien.track.parameters import Belief, Guess
+from mien.track.photometric.image_jacobian import POSE_UNKNOWNS
+from mien.track.photometric.level_solver import solve
+from mien.track.photometric.linearization import Linearize, Look, Pictures, Scene, by_bands
+from mien.track.photometric.normal_equations import Equations
+from mien.track.photometric.numeric_jacobian import by_differences, unknowns_named
 
 FACE_PX, LEVELS, SCALE = 150.0, 3, 40.0
 EVERY = 5

@@ -14,13 +14,13 @@ from benchmarks.track_clips import CLIPS
 from benchmarks.track_runs import follow
 from benchmarks.track_scenes import choose_three, cluttered, made_up_head, perform, with_expressions
 from mien.arrays import Array, UInt8
-from mien.capture.detector import LandmarkDetector
-from mien.capture.video import Video
-from mien.formats.head_folder import load_head
-from mien.formats.image import save_image
-from mien.model.head import Head
-from mien.report.track_plots import write_track_plots
-from mien.report.track_sheet import contact_sheet
+from mien.capture.faces.detector import LandmarkDetector
+from mien.capture.video.video import Video
+from mien.head import Head
+from mien.io.files.image import save_image
+from mien.io.head.head_folder import load_head
+from mien.report.track.plots import write_track_plots
+from mien.report.track.sheet import contact_sheet
 from mien.track.state import Track
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mien.arrays import Array, Float, UInt8
-from mien.capture.detector import LandmarkDetector
-from mien.model.head import Head
+from mien.capture.faces.detector import LandmarkDetector
+from mien.head import Head
 from mien.track.state import Track
 from mien.track.tracker import Tracker
 

@@ -14,14 +14,14 @@ import numpy as np
 from benchmarks.subjects import DEMO, person_vertices
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
-from mien.build import BuildOptions, build_head
 from mien.errors import InputError
-from mien.expressions.rig import Rig
+from mien.head import ATLAS, NEUTRAL, Expression, Head
 from mien.mesh import Mesh
-from mien.model.head import ATLAS, NEUTRAL, Expression, Head
-from mien.numeric.raster import interpolate, rasterize
+from mien.numeric.raster.rasterizer import interpolate, rasterize
 from mien.numeric.rotation import rotation_from_vector
+from mien.pipelines.build import BuildOptions, build_head
 from mien.render.morph import MorphRenderer
+from mien.rig.rig import Rig
 from mien.track.state import Layout, Track, TrackedFrame, TrackState
 
 __all__ = [

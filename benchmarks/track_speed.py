@@ -22,9 +22,9 @@ from benchmarks.stages import load_average
 from benchmarks.table import markdown_table, write_results
 from benchmarks.track_scenes import with_expressions
 from mien.arrays import Array, UInt8
-from mien.capture.video import Video
-from mien.formats.head_folder import load_head, save_head
-from mien.formats.video import write_video
+from mien.capture.video.video import Video
+from mien.io.files.video import write_video
+from mien.io.head.head_folder import load_head, save_head
 
 CORES, RUNS, LONG = 2, 3, 10_000
 SIZES = {"300x300": (300, 300), "1920x1080": (1920, 1080)}

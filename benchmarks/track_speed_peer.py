@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.track_peer import peer_faces
-from mien.capture.frames_ahead import frames_ahead
-from mien.capture.video import Video
+from mien.capture.video.frames_ahead import frames_ahead
+from mien.capture.video.video import Video
 
 
 def main(video: Path, output: Path) -> None:

@@ -25,12 +25,12 @@ from benchmarks.track_scenes import (
 )
 from mien.arrays import Array, Float
 from mien.assets.generic import load_generic_head
-from mien.capture.detector import LandmarkDetector
-from mien.expressions.rig import Rig
-from mien.formats.head_folder import load_head
-from mien.model.head import Head
-from mien.report.track_plots import write_track_plots
-from mien.report.track_series import rotation_errors, series_of, translation_errors, truth_for
+from mien.capture.faces.detector import LandmarkDetector
+from mien.head import Head
+from mien.io.head.head_folder import load_head
+from mien.report.track.plots import write_track_plots
+from mien.report.track.series import rotation_errors, series_of, translation_errors, truth_for
+from mien.rig.rig import Rig
 
 HEADER = (
     "",

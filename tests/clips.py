@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mien.arrays import Array
-from mien.capture.frame_choice import FrameScores
-from mien.capture.mediapipe_face import BLENDSHAPE_NAMES
+from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
+from mien.capture.video.frame_selection import FrameScores
 
 
 def scored(**units: float) -> Array:

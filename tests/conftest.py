@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytest_plugins = ["commands"]
+
 
 def pytest_configure(config: pytest.Config) -> None:
     """Processes that test side by side share the cores, and with them each its threads."""

@@ -11,12 +11,12 @@ import numpy as np
 from marbled import GENERIC, Person, at
 from mien.arrays import Array
 from mien.camera import Camera
-from mien.capture.landmarks import Landmarks
+from mien.capture.faces.landmarks import Landmarks
 from mien.capture.source import View
-from mien.model.expression.known import KnownHead
-from mien.model.features import Features, gather_features
-from mien.model.sightings import Sightings
 from mien.numeric.rotation import rotation_from_vector
+from mien.reconstruction.expression.known_head import KnownHead
+from mien.reconstruction.features import Features, gather_features
+from mien.reconstruction.observations import Sightings
 from people import person
 
 NEUTRAL = person(3)

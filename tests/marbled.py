@@ -12,10 +12,10 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from mien.arrays import Array
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
-from mien.capture.landmarks import Landmarks
-from mien.capture.photos import Photo
+from mien.capture.faces.landmarks import Landmarks
+from mien.capture.images.photos import Photo
 from mien.capture.source import View
-from mien.numeric.raster import interpolate, rasterize
+from mien.numeric.raster.rasterizer import interpolate, rasterize
 from people import camera
 
 GENERIC = load_generic_head()

@@ -10,11 +10,11 @@ import numpy as np
 import posable
 from mien.arrays import Array
 from mien.camera import Camera
-from mien.capture.detector import LandmarkDetector
-from mien.capture.mediapipe_face import BLENDSHAPE_NAMES, DetectedFace
-from mien.model.head import Head
+from mien.capture.faces.detector import LandmarkDetector
+from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES, DetectedFace
+from mien.head import Head
 from mien.numeric.rotation import rotation_from_vector
-from mien.track.start import Starter
+from mien.track.landmarks.initialization import Starter
 from mien.track.state import Layout, TrackState
 
 SIZE, FOCAL = (640, 480), 800.0

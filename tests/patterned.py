@@ -11,15 +11,15 @@ from scipy.ndimage import distance_transform_edt
 
 from mien.arrays import Array
 from mien.camera import Camera
-from mien.model.head import ATLAS, Expression, Head
-from mien.numeric.raster import interpolate, rasterize
+from mien.head import ATLAS, Expression, Head
+from mien.numeric.raster.rasterizer import interpolate, rasterize
 from mien.numeric.rotation import rotation_from_vector
 from mien.render.morph import MorphRenderer
-from mien.track.drawing import Pose
-from mien.track.face import FaceParameters, TrackedFace
-from mien.track.guess import Guess
-from mien.track.looks import Scene
-from mien.track.views import View, cut_views
+from mien.track.face_model import FaceParameters, TrackedFace
+from mien.track.image.drawing import Pose
+from mien.track.image.frame_pyramid import View, cut_views
+from mien.track.parameters import Guess
+from mien.track.photometric.linearization import Scene
 from posable import GENERIC, REST, UNITS, head_of, shapes
 
 SIZE, FOCAL = 240, 560.0

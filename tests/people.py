@@ -11,8 +11,8 @@ from mien.arrays import Array
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
 from mien.capture.annotations import Annotations
-from mien.capture.landmarks import Landmarks
-from mien.capture.photos import Photo
+from mien.capture.faces.landmarks import Landmarks
+from mien.capture.images.photos import Photo
 from mien.capture.source import View
 from mien.numeric.rotation import angle_between, rotation_from_vector
 

@@ -10,9 +10,9 @@ import numpy as np
 from expressive import bump, weights_of
 from marbled import GENERIC
 from mien.arrays import Array
-from mien.expressions.followers import part_vertices
-from mien.expressions.gaze import with_turned_eyes
-from mien.model.head import ATLAS, Expression, Head
+from mien.head import ATLAS, Expression, Head
+from mien.rig.followers import part_vertices
+from mien.rig.gaze import with_turned_eyes
 
 REST = np.asarray(GENERIC.mesh.vertices, np.float64)
 NAMES = ("neutral", "joy", "anger", "awe")

@@ -8,8 +8,8 @@ import numpy as np
 
 from mien.arrays import Array
 from mien.camera import Camera
-from mien.model.dense.joint import Lenses, PlacePrior, Sightings
 from mien.numeric.rotation import rotation_from_vector
+from mien.reconstruction.dense.joint import Lenses, PlacePrior, Sightings
 from people import camera
 
 PLACES = 90

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mien.build import Build
+from mien.pipelines.build import Build
 from mien.render.picture import turntable_frames
 
 FAST = ("--texture-size", "256")

@@ -70,7 +70,7 @@ def test_every_package_that_mien_imports_is_asked_for() -> None:
 
 
 def test_what_the_kernels_cache_takes_of_numba() -> None:
-    """Names that Numba does not promise; `mien.numeric.jit` stands on them."""
+    """Names that Numba does not promise; `mien.numeric.kernels.jit` stands on them."""
     from numba.core.compiler import CompileResult
     from numba.core.dispatcher import Dispatcher
 

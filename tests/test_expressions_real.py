@@ -11,16 +11,16 @@ import pytest
 
 from mien.arrays import Array
 from mien.assets.generic import load_generic_head
-from mien.build import Build, build_head
 from mien.camera import Camera
-from mien.expressions.regions import MASKS, default_masks
-from mien.expressions.rig import Rig
-from mien.expressions.state import FaceState, PosedFace
-from mien.model.head import NEUTRAL
-from mien.numeric.raster import interpolate
+from mien.head import NEUTRAL
+from mien.numeric.raster.rasterizer import interpolate
+from mien.pipelines.build import Build, build_head
 from mien.render.morph import MorphRenderer
 from mien.render.picture import HeadRenderer
 from mien.render.shade import rasterize_mesh, shown_parts
+from mien.rig.regions import MASKS, default_masks
+from mien.rig.rig import Rig
+from mien.rig.state import FaceState, PosedFace
 
 GENERIC = load_generic_head()
 

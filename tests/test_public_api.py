@@ -75,4 +75,4 @@ def test_importing_mien_loads_nothing_heavy() -> None:
     ],
 )
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
-    assert heavy_modules_after(f"from mien.app.cli import main\nmain({arguments})") == []
+    assert heavy_modules_after(f"from mien.cli.main import main\nmain({arguments})") == []

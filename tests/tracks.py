@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mien.animate.tracked import FACING
+from mien.animate.from_track import FACING
 from mien.numeric.rotation import rotation_from_vector
 from mien.track.state import Layout, Status, Track, TrackedFrame, TrackState
 

@@ -15,14 +15,14 @@ from PIL import Image, ImageDraw
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
-from mien.expressions.regions import MASKS, default_masks
-from mien.expressions.state import FACE, FaceState
-from mien.formats.head_folder import load_head
-from mien.formats.image import load_image
-from mien.model.head import NEUTRAL, Head
+from mien.head import NEUTRAL, Head
+from mien.io.files.image import load_image
+from mien.io.head.head_folder import load_head
 from mien.render.orbit import orbit_camera
 from mien.render.picture import HeadRenderer
 from mien.render.shade import render
+from mien.rig.regions import MASKS, default_masks
+from mien.rig.state import FACE, FaceState
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 _TILE = (260, 320)

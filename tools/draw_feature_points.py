@@ -15,8 +15,8 @@ from PIL import Image, ImageDraw
 from mien.arrays import Array, Float
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.assets.subregions import default_subregions
-from mien.capture.detector import LandmarkDetector
-from mien.capture.photos import load_photo
+from mien.capture.faces.detector import LandmarkDetector
+from mien.capture.images.photos import load_photo
 
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "feature-points.jpg"
 _HEIGHT = 700

@@ -14,13 +14,13 @@ from PIL import Image, ImageDraw
 
 from mien.arrays import Array, Float
 from mien.camera import Camera
-from mien.expressions.state import FACE, FaceState
-from mien.formats.head_folder import load_head
-from mien.model.head import NEUTRAL
+from mien.head import NEUTRAL
+from mien.io.head.head_folder import load_head
 from mien.render.orbit import orbit_camera
 from mien.render.picture import HeadRenderer
-from mien.synthesis.coefficients import UPPER_FACE
-from mien.synthesis.head_synthesizer import HeadSynthesizer
+from mien.rig.state import FACE, FaceState
+from mien.synthesis.heads.synthesizer import HeadSynthesizer
+from mien.synthesis.inference.coefficients import UPPER_FACE
 
 IMAGE = Path(__file__).parents[1] / "docs" / "images" / "synthesis-head.jpg"
 _TILE = (250, 310)

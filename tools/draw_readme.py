@@ -13,13 +13,13 @@ import numpy as np
 
 from mien.animate.perform import moved_camera
 from mien.animate.sample import SAMPLE_TIMELINE
-from mien.app.demo import UNITS, demo_photos
 from mien.arrays import Array
-from mien.build import build_head
-from mien.expressions.state import FaceState
-from mien.formats.image import save_image
-from mien.formats.timeline_json import load_timeline
+from mien.io.files.image import save_image
+from mien.io.timeline.timeline_json import load_timeline
+from mien.pipelines.build import build_head
+from mien.pipelines.demo import UNITS, demo_photos
 from mien.render.picture import HeadRenderer, render_head
+from mien.rig.state import FaceState
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 _SECONDS = (1.0, 1.83, 2.9, 4.0, 4.75, 6.7, 8.6)

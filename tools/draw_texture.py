@@ -13,7 +13,7 @@ from mien.assets.generic import load_generic_head
 from mien.camera import Camera
 from mien.capture.source import load_capture
 from mien.mesh import Mesh
-from mien.model.fit import FitOptions, fit_views
+from mien.reconstruction.fit import FitOptions, fit_views
 from mien.render.orbit import orbit_camera
 from mien.render.shade import render
 from mien.texture.atlas import atlas_surface

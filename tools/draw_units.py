@@ -16,11 +16,11 @@ from PIL import Image, ImageDraw
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.camera import Camera
-from mien.expressions.gaze import SIDES
-from mien.expressions.state import FaceState
-from mien.formats.head_folder import load_head
-from mien.model.head import Head
+from mien.head import Head
+from mien.io.head.head_folder import load_head
 from mien.render.picture import HeadRenderer
+from mien.rig.gaze import SIDES
+from mien.rig.state import FaceState
 
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "face-units.jpg"
 _TILE = (200, 240)

@@ -29,7 +29,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from mien.app.demo import demo_photos
+from mien.pipelines.demo import demo_photos
 
 SIGNALS = [signal.SIGKILL] * 6 + [signal.SIGTERM, signal.SIGINT]
 TIMELINE = {

@@ -17,11 +17,11 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.camera import Camera
-from mien.expressions.contacts import Contacts, Mechanics, fit_units
-from mien.expressions.gaze import SIDES
-from mien.expressions.transfer import transfer_units
-from mien.formats.head_folder import load_head
+from mien.io.head.head_folder import load_head
 from mien.render.shade import rasterize_mesh
+from mien.rig.contacts.contacts import Contacts, Mechanics, fit_units
+from mien.rig.gaze import SIDES
+from mien.rig.unit_transfer import transfer_units
 
 _LEAST_MM = 0.1
 _VIEWS = [(yaw, pitch) for yaw in (-30, 0, 30) for pitch in (-20, 0, 20)]

@@ -10,29 +10,29 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mien.animate.timeline import Timeline
-    from mien.app.animate import Take, animate_head
-    from mien.app.examples import gather_examples
-    from mien.app.synthesize import synthesize_expression
-    from mien.app.track import Tracked, track_video
-    from mien.app.track_files import TrackFiles
     from mien.assets.generic import load_generic_head
-    from mien.build import Build, BuildOptions, build_head
     from mien.camera import Camera
-    from mien.capture.detector import LandmarkDetector
+    from mien.capture.faces.detector import LandmarkDetector
     from mien.errors import EstimationError, FileFormatError, InputError, MienError
-    from mien.expressions.rig import Rig
-    from mien.expressions.state import FaceState, Gaze
-    from mien.formats.example_folder import load_examples, write_examples
-    from mien.formats.export import export_head
-    from mien.formats.head_folder import load_head, save_head
-    from mien.formats.timeline_file import load_performance
-    from mien.formats.track_csv import load_track, write_track
+    from mien.head import Head
+    from mien.io.examples.example_folder import load_examples, write_examples
+    from mien.io.head.head_folder import load_head, save_head
+    from mien.io.mesh.export import export_head
+    from mien.io.timeline.timeline_file import load_performance
+    from mien.io.tracks.track_csv import load_track, write_track
     from mien.mesh import Mesh
-    from mien.model.fit import FitOptions
-    from mien.model.head import Head
+    from mien.pipelines.animate import Take, animate_head
+    from mien.pipelines.build import Build, BuildOptions, build_head
+    from mien.pipelines.examples import gather_examples
+    from mien.pipelines.synthesize import synthesize_expression
+    from mien.pipelines.track import Tracked, track_video
+    from mien.pipelines.tracking.outputs import TrackFiles
+    from mien.reconstruction.fit import FitOptions
     from mien.render.picture import HeadRenderer, render_head
-    from mien.synthesis.examples import Example, ExampleSet
-    from mien.synthesis.head_synthesizer import HeadSynthesis, HeadSynthesizer
+    from mien.rig.rig import Rig
+    from mien.rig.state import FaceState, Gaze
+    from mien.synthesis.examples.example_set import Example, ExampleSet
+    from mien.synthesis.heads.synthesizer import HeadSynthesis, HeadSynthesizer
     from mien.synthesis.synthesizer import Synthesis, SynthesisOptions, Synthesizer
     from mien.track.state import Track, TrackedFrame, TrackState
     from mien.track.tracker import Tracker, TrackOptions
@@ -89,52 +89,52 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Build": "build",
-    "BuildOptions": "build",
+    "Build": "pipelines.build",
+    "BuildOptions": "pipelines.build",
     "Camera": "camera",
     "EstimationError": "errors",
-    "Example": "synthesis.examples",
-    "ExampleSet": "synthesis.examples",
-    "FaceState": "expressions.state",
+    "Example": "synthesis.examples.example_set",
+    "ExampleSet": "synthesis.examples.example_set",
+    "FaceState": "rig.state",
     "FileFormatError": "errors",
-    "FitOptions": "model.fit",
-    "Gaze": "expressions.state",
-    "Head": "model.head",
+    "FitOptions": "reconstruction.fit",
+    "Gaze": "rig.state",
+    "Head": "head",
     "HeadRenderer": "render.picture",
-    "HeadSynthesis": "synthesis.head_synthesizer",
-    "HeadSynthesizer": "synthesis.head_synthesizer",
+    "HeadSynthesis": "synthesis.heads.synthesizer",
+    "HeadSynthesizer": "synthesis.heads.synthesizer",
     "InputError": "errors",
-    "LandmarkDetector": "capture.detector",
+    "LandmarkDetector": "capture.faces.detector",
     "Mesh": "mesh",
     "MienError": "errors",
-    "Rig": "expressions.rig",
+    "Rig": "rig.rig",
     "Synthesis": "synthesis.synthesizer",
     "SynthesisOptions": "synthesis.synthesizer",
     "Synthesizer": "synthesis.synthesizer",
-    "Take": "app.animate",
+    "Take": "pipelines.animate",
     "Timeline": "animate.timeline",
     "Track": "track.state",
-    "TrackFiles": "app.track_files",
+    "TrackFiles": "pipelines.tracking.outputs",
     "TrackOptions": "track.tracker",
     "TrackState": "track.state",
-    "Tracked": "app.track",
+    "Tracked": "pipelines.track",
     "TrackedFrame": "track.state",
     "Tracker": "track.tracker",
-    "animate_head": "app.animate",
-    "build_head": "build",
-    "export_head": "formats.export",
-    "gather_examples": "app.examples",
-    "load_examples": "formats.example_folder",
+    "animate_head": "pipelines.animate",
+    "build_head": "pipelines.build",
+    "export_head": "io.mesh.export",
+    "gather_examples": "pipelines.examples",
+    "load_examples": "io.examples.example_folder",
     "load_generic_head": "assets.generic",
-    "load_head": "formats.head_folder",
-    "load_performance": "formats.timeline_file",
-    "load_track": "formats.track_csv",
+    "load_head": "io.head.head_folder",
+    "load_performance": "io.timeline.timeline_file",
+    "load_track": "io.tracks.track_csv",
     "render_head": "render.picture",
-    "save_head": "formats.head_folder",
-    "synthesize_expression": "app.synthesize",
-    "track_video": "app.track",
-    "write_examples": "formats.example_folder",
-    "write_track": "formats.track_csv",
+    "save_head": "io.head.head_folder",
+    "synthesize_expression": "pipelines.synthesize",
+    "track_video": "pipelines.track",
+    "write_examples": "io.examples.example_folder",
+    "write_track": "io.tracks.track_csv",
 }
 
 

@@ -13,7 +13,7 @@ def main() -> int:
     # Nothing is imported above that takes time: a traceback of imports helps nobody.
     try:
         _heed_stops()
-        from mien.app.cli import main as run
+        from mien.cli.main import main as run
 
         return run()
     except KeyboardInterrupt:

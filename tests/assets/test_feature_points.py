@@ -14,7 +14,7 @@ import pytest
 from documents import put
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.assets.generic import load_generic_head
-from mien.capture.mediapipe_face import LEFT_IRIS, RIGHT_IRIS
+from mien.capture.faces.mediapipe_face import LEFT_IRIS, RIGHT_IRIS
 from mien.errors import FileFormatError, InputError
 
 LEFT_EYE = (

@@ -13,7 +13,7 @@ import mien.assets.generic as generic
 from mien.arrays import Array
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.errors import FileFormatError, InputError
-from mien.numeric.raster import rasterize
+from mien.numeric.raster.rasterizer import rasterize
 
 FLIP = np.array([-1.0, 1.0, 1.0])
 PARTS = (

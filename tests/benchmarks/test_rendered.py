@@ -32,9 +32,9 @@ from benchmarks.subjects import (
 
 from mien.arrays import Array
 from mien.assets.generic import load_generic_head
-from mien.capture.photos import load_photo, shrunk
+from mien.capture.images.photos import load_photo, shrunk
 from mien.mesh import Mesh
-from mien.numeric.sample import sample_bilinear
+from mien.numeric.images.sampling import sample_bilinear
 from mien.render.shade import rasterize_mesh
 from shapes import RADII, ellipsoid, smooth_texture, with_nose
 

@@ -6,7 +6,7 @@ import numpy as np
 from benchmarks.track_errors import shape_errors, weight_errors
 
 from mien.arrays import Array
-from mien.expressions.rig import Rig
+from mien.rig.rig import Rig
 from mien.track.state import Layout, Track, TrackedFrame, TrackState
 from posable import GENERIC, head
 

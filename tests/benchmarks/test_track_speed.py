@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from benchmarks.track_speed import Ran, ping_pong, run
 
-from mien.formats.video import write_video
+from mien.io.files.video import write_video
 
 
 def test_a_clip_goes_forward_and_backward(tmp_path: Path) -> None:

@@ -11,8 +11,8 @@ from PIL import Image
 
 import mien.assets
 from mien.arrays import Array
-from mien.capture.detector import LandmarkDetector
-from mien.capture.photos import Photo
+from mien.capture.faces.detector import LandmarkDetector
+from mien.capture.images.photos import Photo
 
 JAMES = Path(mien.assets.__file__).parent / "data" / "james"
 

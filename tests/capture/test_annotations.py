@@ -15,7 +15,7 @@ from mien.capture.annotations import (
     load_annotations,
     save_annotations,
 )
-from mien.capture.photos import Photo
+from mien.capture.images.photos import Photo
 from mien.errors import FileFormatError, InputError
 
 NAMES = AnnotationNames(frozenset({"nose_tip", "chin", "left_jaw.3"}), frozenset({"left_jaw"}))

@@ -11,10 +11,10 @@ import mien.assets
 from mien.arrays import Array
 from mien.capture import source
 from mien.capture.annotations import AnnotationNames
-from mien.capture.detector import NO_FACE
-from mien.capture.photos import Photo
-from mien.capture.picked_frames import PickedFrames
+from mien.capture.faces.detector import NO_FACE
+from mien.capture.images.photos import Photo
 from mien.capture.source import TO_BE_PLACED, load_capture
+from mien.capture.video.picked_frames import PickedFrames
 from mien.errors import EstimationError, FileFormatError, InputError
 
 JAMES = Path(mien.assets.__file__).parent / "data" / "james"

@@ -12,11 +12,11 @@ from PIL import Image
 
 from filmed import grey, written
 from mien.capture.folder import ignored_files, photo_files
-from mien.capture.made_folders import made_by_mien
+from mien.capture.output_folders import made_by_mien
 from mien.capture.source_kind import kind_of_source
 from mien.errors import FileFormatError, InputError
-from mien.formats.example_folder import FORMAT as EXAMPLES
-from mien.formats.head_json import FORMAT as HEAD
+from mien.io.examples.example_folder import FORMAT as EXAMPLES
+from mien.io.head.head_json import FORMAT as HEAD
 
 CLIPS = {
     "mp4": "libx264",

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mien.errors import EstimationError
-from mien.numeric.anderson import Anderson
-from mien.numeric.lm import minimize_lm
-from mien.numeric.schur import BlockSystem
+from mien.numeric.solvers.anderson import Anderson
+from mien.numeric.solvers.levenberg_marquardt import minimize_lm
+from mien.numeric.solvers.schur import BlockSystem
 
 
 def test_anderson_solves_linear_maps_in_as_many_steps_as_unknowns(rng):

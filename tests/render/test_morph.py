@@ -7,11 +7,11 @@ import pytest
 from mien.arrays import Array
 from mien.camera import Camera
 from mien.errors import InputError
-from mien.expressions.state import PosedFace
 from mien.mesh import Mesh
-from mien.numeric.raster import interpolate
+from mien.numeric.raster.rasterizer import interpolate
 from mien.render.morph import MorphRenderer
 from mien.render.shade import rasterize_mesh, render
+from mien.rig.state import PosedFace
 from shapes import camera_at, ellipsoid, with_nose
 
 MESH = ellipsoid(60, 120)

@@ -6,10 +6,10 @@ import pytest
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
 from mien.errors import InputError
-from mien.expressions.state import FACE, FaceState, Gaze
-from mien.model.head import Expression, FittedView, Head
+from mien.head import Expression, FittedView, Head
 from mien.render.morph import MorphRenderer
 from mien.render.picture import HeadRenderer, render_head, turntable_frames
+from mien.rig.state import FACE, FaceState, Gaze
 from people import camera
 
 GENERIC = load_generic_head()

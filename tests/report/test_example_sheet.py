@@ -9,7 +9,7 @@ from mien.arrays import Array
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.assets.subregions import Subregions
 from mien.report.example_sheet import example_sheet
-from mien.synthesis.examples import Example, ExampleSet
+from mien.synthesis.examples.example_set import Example, ExampleSet
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,11 @@ from PIL import Image
 
 from mien.arrays import Array
 from mien.assets.generic import load_generic_head
-from mien.expressions.state import FaceState
-from mien.model.head import Expression, FittedView, Head
+from mien.head import Expression, FittedView, Head
 from mien.render.picture import HeadRenderer
 from mien.report import ReportInput, render_report
 from mien.report.expressions import MIXTURES, expression_psnr, expression_rows
+from mien.rig.state import FaceState
 from people import camera
 
 GENERIC = load_generic_head()

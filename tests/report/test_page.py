@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from mien.assets.generic import load_generic_head
-from mien.model.fit import Fit, FitOptions, fit_views
-from mien.model.head import Expression, FittedView, Head
-from mien.model.verdict import Mark, PhotoFit
+from mien.head import Expression, FittedView, Head
+from mien.reconstruction.fit import Fit, FitOptions, fit_views
+from mien.reconstruction.outliers import Mark, PhotoFit
 from mien.render.orbit import orbit_camera
 from mien.report import ReportInput, render_report
 from mien.report.page import head_angles

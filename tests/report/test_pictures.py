@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 
 from mien.assets.generic import load_generic_head
-from mien.model.head import Expression, Head
-from mien.model.verdict import Mark, PhotoFit
+from mien.head import Expression, Head
+from mien.reconstruction.outliers import Mark, PhotoFit
 from mien.report.pictures import coverage_pictures, overlay_picture, preview_pictures
 from people import camera
 

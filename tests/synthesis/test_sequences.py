@@ -17,8 +17,8 @@ import pytest
 
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
-from mien.synthesis.coefficients import coefficients
-from mien.synthesis.examples import Example, ExampleSet
+from mien.synthesis.examples.example_set import Example, ExampleSet
+from mien.synthesis.inference.coefficients import coefficients
 from mien.synthesis.synthesizer import SynthesisOptions, Synthesizer
 
 LAYOUT = load_feature_layout()
@@ -55,8 +55,8 @@ def person():
 @pytest.fixture(scope="module")
 def filmed(shared: Path):
     """Sixteen frames of a clip as examples, spread over it; others as key geometries."""
-    from mien.capture.detector import LandmarkDetector
-    from mien.capture.video import Video
+    from mien.capture.faces.detector import LandmarkDetector
+    from mien.capture.video.video import Video
 
     clip = Video(shared / "data" / "videos" / "driving_d10.mp4")
     frames = [frame.pixels() for i, frame in enumerate(clip.frames()) if i % 14 == 0]

@@ -10,9 +10,9 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
 from mien.errors import EstimationError, InputError
-from mien.numeric.planar_motion import PlanarMotion
-from mien.synthesis.coefficients import hull_distances
-from mien.synthesis.examples import Example, ExampleSet
+from mien.numeric.planar_similarity import PlanarMotion
+from mien.synthesis.examples.example_set import Example, ExampleSet
+from mien.synthesis.inference.coefficients import hull_distances
 from mien.synthesis.synthesizer import Synthesis, SynthesisOptions, Synthesizer
 
 WIDTH, HEIGHT = 160, 200

@@ -10,7 +10,7 @@ import pytest
 import posable
 from mien.camera import Camera
 from mien.errors import InputError
-from mien.model.head import FittedView, Head
+from mien.head import FittedView, Head
 from mien.track.lens import LogFocal, expected_focal, parse_lens
 
 FRONT = np.diag([1.0, -1.0, -1.0])

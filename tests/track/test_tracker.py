@@ -14,8 +14,8 @@ from marked import Blind
 from mien.arrays import Array
 from mien.errors import InputError
 from mien.numeric.rotation import angle_between
-from mien.track.guess import Guess
-from mien.track.start import Found, Starter
+from mien.track.landmarks.initialization import Found, Starter
+from mien.track.parameters import Guess
 from mien.track.state import TrackedFrame, TrackState
 from mien.track.tracker import STRANGE_RMS, Tracker, TrackOptions
 

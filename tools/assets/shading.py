@@ -9,7 +9,7 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.camera import Camera
 from mien.mesh import Mesh
-from mien.numeric.raster import Raster, interpolate, rasterize
+from mien.numeric.raster.rasterizer import Raster, interpolate, rasterize
 
 _PUPIL_MM, _IRIS_MM = 2.2, 5.9
 _IRIS, _SCLERA = (0.32, 0.22, 0.14), (0.88, 0.86, 0.84)

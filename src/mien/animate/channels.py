@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from mien.arrays import Array, Float
 from mien.errors import InputError
-from mien.expressions.regions import AROUND
-from mien.expressions.state import FACE, FaceState, Gaze
+from mien.rig.regions import AROUND
+from mien.rig.state import FACE, FaceState, Gaze
 
 HEAD, GAZE, UNITS = "head", "gaze", "units"
 """Groups of channels besides the regions. A channel's name is GROUP.NAME: `units.jawOpen`."""

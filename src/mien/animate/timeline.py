@@ -13,8 +13,8 @@ from mien.animate.curves import Curve, constant
 from mien.animate.layers import Generator
 from mien.arrays import Array, Float, check_array, check_positive, frozen
 from mien.errors import InputError
-from mien.expressions.state import FaceState
 from mien.limits import MAX_FPS, MAX_FRAMES, MAX_SECONDS, MAX_SIDE, UNIT_RANGE
+from mien.rig.state import FaceState
 
 PIVOT_MM = (0.0, -60.0, -80.0)
 """Head space: the top of the neck, where a skull nods and turns."""

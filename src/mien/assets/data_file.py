@@ -6,9 +6,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from mien import strict_json
 from mien.errors import Broken, FileFormatError
-from mien.strict_json import as_list, as_number, as_object, as_text, check_format, join, read_json
+from mien.reading import strict_json
+from mien.reading.strict_json import (
+    as_list,
+    as_number,
+    as_object,
+    as_text,
+    check_format,
+    join,
+    read_json,
+)
 
 VERSION = 1
 _LARGEST_SHARE = 1e6

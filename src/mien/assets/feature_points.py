@@ -14,7 +14,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int, check_array, frozen
 from mien.assets.data_file import need, read_data, shares
 from mien.errors import Broken, InputError
-from mien.numeric.planar_motion import estimate_planar_motion
+from mien.numeric.planar_similarity import estimate_planar_motion
 
 __all__ = ["FeatureLayout", "load_feature_layout"]
 

@@ -13,7 +13,7 @@ from mien.arrays import Array, Bool, Float, Int, check_array, frozen
 from mien.assets.data_file import need, read_data, shares
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import Broken, InputError
-from mien.strict_json import as_number
+from mien.reading.strict_json import as_number
 
 __all__ = ["SubregionDrawing", "Subregions", "default_subregions", "load_subregion_drawing"]
 

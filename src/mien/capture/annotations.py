@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from mien.arrays import Array, Float, frozen
-from mien.capture.photos import Photo
+from mien.capture.images.photos import Photo
 from mien.errors import FileFormatError, InputError
 from mien.limits import LARGEST
-from mien.strict_json import join, kind_of, read_json
+from mien.reading.strict_json import join, kind_of, read_json
 
 if TYPE_CHECKING:
     from mien.assets.generic import GenericHead

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mien.arrays import Array, Float, UInt8
-from mien.capture.landmarks import Landmarks
+from mien.capture.faces.landmarks import Landmarks
 
 if TYPE_CHECKING:
     from mien.capture.source import View

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from mien.capture.expression_names import check_expression_folders
-from mien.capture.files import listed, plain_name
-from mien.capture.images import is_image
-from mien.capture.made_folders import made_by_mien
-from mien.capture.other_kinds import counted, is_unread
-from mien.capture.photos import PHOTO_SUFFIXES
+from mien.capture.images.opening import is_image
+from mien.capture.images.photos import PHOTO_SUFFIXES
+from mien.capture.images.unsupported import counted, is_unread
+from mien.capture.output_folders import made_by_mien
 from mien.capture.source_kind import VIDEO_SUFFIXES, kind_of_source
 from mien.errors import InputError, escaped
+from mien.expression_names import check_expression_folders
+from mien.reading.names import listed, plain_name
 
 NEUTRAL = "neutral"
 ANNOTATIONS = "annotations"

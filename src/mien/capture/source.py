@@ -10,22 +10,22 @@ from pathlib import Path
 import numpy as np
 
 from mien.capture.annotations import AnnotationNames, Annotations, load_annotations
-from mien.capture.detector import NO_FACE, LandmarkDetector, NoFaceError
 from mien.capture.duplicates import same_photo
-from mien.capture.files import plain_name
+from mien.capture.faces.detector import NO_FACE, LandmarkDetector, NoFaceError
+from mien.capture.faces.landmarks import Landmarks
+from mien.capture.faces.mediapipe_face import yaw_pitch
 from mien.capture.folder import (
     ANNOTATIONS,
     ignored_files,
     orphaned_annotations,
     photo_files,
 )
-from mien.capture.landmarks import Landmarks
-from mien.capture.mediapipe_face import yaw_pitch
+from mien.capture.images.photos import MAX_SIDE, Photo, load_photo
 from mien.capture.notes import gathered_notes
-from mien.capture.photos import MAX_SIDE, Photo, load_photo
-from mien.capture.picked_frames import pick_frames
 from mien.capture.source_kind import kind_of_source
+from mien.capture.video.picked_frames import pick_frames
 from mien.errors import EstimationError
+from mien.reading.names import plain_name
 
 Progress = Callable[[int, int], None]
 """Called with the number of steps done and their total."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from mien.capture.files import check_readable, kind_of, named_path
-from mien.capture.images import is_image
-from mien.capture.made_folders import made_by_mien
-from mien.capture.other_kinds import unread_kind
-from mien.capture.photos import PHOTO_SUFFIXES
-from mien.capture.video import is_video
+from mien.capture.images.opening import is_image
+from mien.capture.images.photos import PHOTO_SUFFIXES
+from mien.capture.images.unsupported import unread_kind
+from mien.capture.output_folders import made_by_mien
+from mien.capture.video.video import is_video
 from mien.errors import FileFormatError, InputError
+from mien.reading.names import check_readable, kind_of, named_path
 
 EXPECTED = "a photo, a video or a folder of photos"
 _VIDEO_SUFFIXES = (

@@ -9,7 +9,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8, check_image, frozen
 from mien.errors import InputError
-from mien.numeric.jit import njit
+from mien.numeric.kernels.jit import njit
 
 # A texel's three channels are weighted by one multiplication: each has 21 of 64 bits to itself, 8
 # for the colour and 13 for the weight.

@@ -10,9 +10,15 @@ from mien.arrays import Array, Float, Int, UInt8, frozen
 from mien.camera import Camera
 from mien.errors import InputError
 from mien.mesh import Mesh
-from mien.numeric.coverage import STRIP, Coverage, barycentrics_at, cover_strip, prepare_coverage
-from mien.numeric.jit import njit
-from mien.numeric.threads import for_row_bands
+from mien.numeric.kernels.jit import njit
+from mien.numeric.kernels.threads import for_row_bands
+from mien.numeric.raster.coverage import (
+    STRIP,
+    Coverage,
+    barycentrics_at,
+    cover_strip,
+    prepare_coverage,
+)
 from mien.render.mipmap import (
     Pyramids,
     level_of_detail,

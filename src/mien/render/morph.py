@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from mien.arrays import Array, UInt8
 from mien.camera import Camera
 from mien.errors import InputError
-from mien.expressions.state import PosedFace
 from mien.mesh import Mesh
 from mien.render.mipmap import build_pyramids
 from mien.render.mix import draw_mix, prepare_painted
 from mien.render.projection import samples_across
 from mien.render.shade import over_background, shown_parts
+from mien.rig.state import PosedFace
 
 
 class MorphRenderer:

@@ -11,12 +11,12 @@ import numpy as np
 from mien.arrays import Array, UInt8
 from mien.camera import Camera
 from mien.errors import InputError
-from mien.expressions.rig import Rig
-from mien.expressions.state import FACE, FaceState, PosedFace
+from mien.head import Head
 from mien.limits import MAX_SIDE
-from mien.model.head import Head
 from mien.render.morph import MorphRenderer
 from mien.render.orbit import orbit_camera, turntable
+from mien.rig.rig import Rig
+from mien.rig.state import FACE, FaceState, PosedFace
 
 GREY = (72, 74, 84)
 """Behind a head where a picture is to have no alpha."""

@@ -10,9 +10,9 @@ from mien.arrays import Array, Float, UInt8, check_array, frozen
 from mien.camera import Camera
 from mien.errors import InputError
 from mien.mesh import Mesh
-from mien.numeric.jit import njit
-from mien.numeric.raster import Raster, interpolate, rasterize
-from mien.numeric.threads import for_row_bands
+from mien.numeric.kernels.jit import njit
+from mien.numeric.kernels.threads import for_row_bands
+from mien.numeric.raster.rasterizer import Raster, interpolate, rasterize
 from mien.render.mipmap import build_pyramids
 from mien.render.mix import draw_mix, prepare_painted
 from mien.render.projection import project_safely, samples_across
@@ -107,7 +107,7 @@ def shown_parts(mesh: Mesh) -> tuple[str, ...]:
 
 
 def rasterize_mesh(mesh: Mesh, camera: Camera, *, cull: bool = False) -> Raster:
-    """The mesh as the camera sees it (numeric.raster.rasterize in the camera's pixels)."""
+    """The mesh as the camera sees it (numeric.raster.rasterizer.rasterize in the camera's pixels)."""
     depth, pixels = camera.to_camera(mesh.vertices)[:, 2], project_safely(mesh.vertices, camera)
     return rasterize(pixels, depth, mesh.triangles, camera.width, camera.height, cull=cull)
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from mien.arrays import Array, UInt8
 from mien.report.sheet import arranged
-from mien.report.track_caption import write_on
-from mien.synthesis.examples import Example, ExampleSet
+from mien.report.track.caption import write_on
+from mien.synthesis.examples.example_set import Example, ExampleSet
 
 _CELL = (240, 300)
 """Width and height of a face's picture, px."""

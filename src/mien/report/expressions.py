@@ -10,12 +10,12 @@ import numpy as np
 from mien.arrays import Array, Bool, UInt8
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
-from mien.expressions.state import FACE, FaceState
-from mien.model.head import NEUTRAL, FittedView, Head
+from mien.head import NEUTRAL, FittedView, Head
 from mien.render.picture import GREY, HeadRenderer
 from mien.render.shade import over_background, render
-from mien.report.likeness import face_psnr
 from mien.report.pictures import data_uri
+from mien.report.track.comparison import face_psnr
+from mien.rig.state import FACE, FaceState
 
 MIXTURES = {
     "half of it": {FACE: 0.5},

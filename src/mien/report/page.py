@@ -10,11 +10,11 @@ import numpy as np
 
 from mien.arrays import Array, Float, UInt8
 from mien.camera import Camera
-from mien.model.deform import eye_centers
-from mien.model.expression.fit import ExpressionFit
-from mien.model.fit import Fit
-from mien.model.head import Head
-from mien.model.verdict import Mark, PhotoFit
+from mien.head import Head
+from mien.reconstruction.expression.fit import ExpressionFit
+from mien.reconstruction.fit import Fit
+from mien.reconstruction.outliers import Mark, PhotoFit
+from mien.reconstruction.shape.deformation import eye_centers
 from mien.report.expressions import count_expressions, expression_rows
 from mien.report.pictures import (
     UNCERTAINTY_LIMITS_MM,

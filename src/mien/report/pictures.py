@@ -7,10 +7,10 @@ import base64
 import numpy as np
 
 from mien.arrays import Array, Float, UInt8
-from mien.formats.image import encode_image
+from mien.head import ATLAS, Head
+from mien.io.files.image import encode_image
 from mien.mesh import Mesh
-from mien.model.head import ATLAS, Head
-from mien.model.verdict import PhotoFit
+from mien.reconstruction.outliers import PhotoFit
 from mien.render.orbit import orbit_camera
 from mien.render.overlay import overlay_mesh
 from mien.render.picture import GREY

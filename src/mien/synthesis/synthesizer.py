@@ -11,14 +11,19 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8, check_array, frozen
 from mien.errors import InputError
-from mien.numeric.planar_motion import PlanarMotion, estimate_planar_motion
-from mien.synthesis.coefficients import DISTANCE_PENALTY, apart_from, coefficients_of, distances_of
-from mien.synthesis.compose import Composer
-from mien.synthesis.conditional import ConditionalMotion
-from mien.synthesis.examples import ExampleSet
-from mien.synthesis.inferred import Inference, check_known
-from mien.synthesis.motion import compensated
-from mien.synthesis.propagate import Propagation
+from mien.numeric.planar_similarity import PlanarMotion, estimate_planar_motion
+from mien.synthesis.composition.composer import Composer
+from mien.synthesis.examples.example_set import ExampleSet
+from mien.synthesis.examples.head_alignment import compensated
+from mien.synthesis.inference.coefficients import (
+    DISTANCE_PENALTY,
+    apart_from,
+    coefficients_of,
+    distances_of,
+)
+from mien.synthesis.inference.conditional import ConditionalMotion
+from mien.synthesis.inference.inferred import Inference, check_known
+from mien.synthesis.inference.propagation import Propagation
 
 __all__ = [
     "LEAST_TELLING",

@@ -7,7 +7,7 @@ import numpy as np
 from mien.arrays import Array, Bool
 from mien.errors import InputError
 from mien.mesh import Mesh
-from mien.numeric.raster import rasterize
+from mien.numeric.raster.rasterizer import rasterize
 from mien.texture.surface import SurfaceMap, surface_from
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mien.arrays import Array, Float, frozen
-from mien.numeric.jit import njit
-from mien.numeric.sample import bilinear_place
-from mien.numeric.threads import for_row_bands
+from mien.numeric.images.sampling import bilinear_place
+from mien.numeric.kernels.jit import njit
+from mien.numeric.kernels.threads import for_row_bands
 from mien.texture.surface import SurfaceMap
 from mien.texture.visibility import LEAST_CERTAINTY, View, camera_numbers, project_point, sight
 

@@ -14,8 +14,8 @@ import numpy as np
 from mien.arrays import Array, Float, frozen
 from mien.errors import InputError
 from mien.mesh import Mesh
-from mien.numeric.jit import njit
-from mien.numeric.threads import for_row_bands
+from mien.numeric.kernels.jit import njit
+from mien.numeric.kernels.threads import for_row_bands
 from mien.texture.surface import SurfaceMap, surface_from
 
 WIDTH, HEIGHT = 2048, 1024

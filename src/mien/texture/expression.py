@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, Shaped, UInt8
 from mien.camera import Camera
 from mien.mesh import Mesh
-from mien.numeric.pyramid import fill_pyramid
+from mien.numeric.images.hole_filling import fill_pyramid
 from mien.texture.atlas import fill_gutters
 from mien.texture.blend import Blend, blend_views
 from mien.texture.parts import SEE_THROUGH, STYLES

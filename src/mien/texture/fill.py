@@ -10,8 +10,8 @@ import numpy as np
 
 from mien.arrays import Array, Bool, Float, check_array
 from mien.mesh import Mesh
-from mien.numeric.pyramid import fill_growing, fill_pyramid
-from mien.numeric.sample import sample_bilinear
+from mien.numeric.images.hole_filling import fill_growing, fill_pyramid
+from mien.numeric.images.sampling import sample_bilinear
 from mien.texture.blend import Blend
 from mien.texture.cylinder import Cylinder
 from mien.texture.parts import EARS, FILLED_ALONE, REGION_COLOURS

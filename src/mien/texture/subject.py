@@ -7,7 +7,7 @@ import numpy as np
 from mien.arrays import Array, Bool, UInt8, check_image
 from mien.camera import Camera
 from mien.mesh import Mesh
-from mien.numeric.raster import rasterize
+from mien.numeric.raster.rasterizer import rasterize
 
 # Longest side of the small image that is segmented, px.
 _SIDE = 240

@@ -9,7 +9,7 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, Int
 from mien.errors import InputError
 from mien.mesh import Mesh
-from mien.numeric.raster import Raster, interpolate
+from mien.numeric.raster.rasterizer import Raster, interpolate
 
 
 @dataclass(frozen=True)

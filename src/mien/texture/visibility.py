@@ -10,10 +10,10 @@ from mien.arrays import Array, Bool, Float, UInt8, check_image, check_positive, 
 from mien.camera import Camera
 from mien.errors import InputError
 from mien.mesh import Mesh
-from mien.numeric.jit import njit
-from mien.numeric.raster import rasterize
-from mien.numeric.sample import bilinear_place
-from mien.numeric.threads import for_row_bands
+from mien.numeric.images.sampling import bilinear_place
+from mien.numeric.kernels.jit import njit
+from mien.numeric.kernels.threads import for_row_bands
+from mien.numeric.raster.rasterizer import rasterize
 from mien.texture.surface import SurfaceMap
 
 # Two neighbouring pixels of the depth map that differ by more lie on different layers. One pixel

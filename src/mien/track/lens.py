@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mien.arrays import check_positive
-from mien.capture.exif import FILM_DIAGONAL_MM
+from mien.capture.images.exif import FILM_DIAGONAL_MM
 from mien.errors import InputError
-from mien.model.head import Head
-from mien.model.landmark_fit import FOCAL_PRIOR_DEVIATION, FOCAL_PRIOR_DIAGONALS
+from mien.head import Head
+from mien.reconstruction.landmark_fit import FOCAL_PRIOR_DEVIATION, FOCAL_PRIOR_DIAGONALS
 
 SAME_LENS_DEVIATION = 0.15
 """Of log focal length: a video in the shape of the head's own photos is likely of their camera."""

@@ -10,8 +10,8 @@ import numpy as np
 from mien.arrays import Array, Float, check_array, check_positive, check_rotation, frozen
 from mien.camera import Camera
 from mien.errors import InputError
-from mien.expressions.state import FaceState, Gaze
-from mien.model.head import NEUTRAL
+from mien.head import NEUTRAL
+from mien.rig.state import FaceState, Gaze
 
 Status = Literal["ok", "reacquired", "lost"]
 STATUSES: tuple[Status, ...] = ("ok", "reacquired", "lost")

@@ -9,18 +9,18 @@ import numpy as np
 
 from mien.arrays import Array, Float, UInt8
 from mien.camera import Camera
-from mien.capture.detector import LandmarkDetector
-from mien.model.head import Head
+from mien.capture.faces.detector import LandmarkDetector
+from mien.head import Head
 from mien.numeric.rotation import rotation_from_vector, rotation_to_vector
-from mien.track.colours import Colours
-from mien.track.drawing import Pose
-from mien.track.face import FaceParameters, TrackedFace
-from mien.track.fit import FitOptions, Fitted, FrameFit
-from mien.track.flows import POSE_UNKNOWNS
-from mien.track.guess import Belief, Guess
-from mien.track.start import Found, Starter
+from mien.track.face_model import FaceParameters, TrackedFace
+from mien.track.image.colour_gain import Colours
+from mien.track.image.drawing import Pose
+from mien.track.landmarks.initialization import Found, Starter
+from mien.track.parameters import Belief, Guess
+from mien.track.photometric.frame_fit import FitOptions, Fitted, FrameFit
+from mien.track.photometric.image_jacobian import POSE_UNKNOWNS
+from mien.track.photometric.shrinkage import Block, steady_step
 from mien.track.state import Layout, Status, TrackedFrame, TrackState
-from mien.track.steady import Block, steady_step
 
 _POSE_DEVIATIONS = (0.1, 0.1, 0.1, 15.0, 15.0, 40.0, 0.3)
 """Rotation (rad), translation (mm), log focal length: how far a head may go in a frame."""

@@ -1,0 +1,271 @@
+"""Every picture of one person's face: all photos of a folder, or all frames of a video."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mien.arrays import Array, Float, Int, UInt8
+from mien.capture.faces.detector import LandmarkDetector, closer
+from mien.capture.faces.mediapipe_face import DetectedFace
+from mien.capture.faces.sharpness import face_sharpness
+from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
+from mien.capture.images.photos import Photo, load_photo
+from mien.capture.notes import gathered_notes
+from mien.capture.source_kind import kind_of_source
+from mien.capture.video.clip_notes import ClipNotes
+from mien.capture.video.frame_photos import fetch_frames, frame_name
+from mien.capture.video.frame_selection import FrameScores
+from mien.capture.video.frames_ahead import frames_ahead
+from mien.capture.video.orientation import turn_upright
+from mien.capture.video.video import Video
+from mien.errors import EstimationError, InputError
+from mien.reading.names import plain_name
+
+__all__ = ["FaceSeries", "Look", "find_faces", "load_pictures", "row_of", "rows_of"]
+
+Look = Callable[[UInt8[Array, "h w 3"], Float[Array, "478 2"]], None]
+"""Told of each picture that shows a face, in the series' order, and where its landmarks are."""
+
+Report = Callable[[int, int], None]
+"""Told the number of steps done and their total; 0: not known."""
+
+
+@dataclass(frozen=True)
+class FaceSeries:
+    """The pictures that show the person's face, without their pixels.
+
+    Attributes:
+        source: the video or the folder. is_video: which of both.
+        files: of a folder, each picture's file; of a video, empty.
+        names: of the pictures: `frame_000123.png`, `smile.jpg`, or `joy/smile.jpg` in a folder of
+            one folder an expression.
+        landmarks: (N, 478, 2) float32, px of the picture as `load_pictures` gives it.
+        sizes: (N, 2) their widths and heights, px.
+        scores: of the same; `index` counts frames or photos from 0.
+        seconds: of a video's frames, since its beginning.
+        max_side: px; larger pictures are reduced to it.
+        quarters: turns counterclockwise of a video's frames, beyond what its file says.
+        left_out: why, by name, of the pictures in which no face can be used.
+        notes: what was odd.
+    """
+
+    source: Path
+    is_video: bool
+    files: tuple[Path, ...]
+    names: tuple[str, ...]
+    landmarks: Float[Array, "n 478 2"]
+    sizes: Int[Array, "n 2"]
+    scores: FrameScores
+    seconds: Float[Array, " n"] | None
+    max_side: int
+    left_out: dict[str, str]
+    notes: tuple[str, ...]
+    quarters: int = 0
+
+    def __len__(self) -> int:
+        """How many pictures show the face."""
+        return len(self.names)
+
+
+def find_faces(
+    source: str | Path,
+    detector: LandmarkDetector,
+    *,
+    max_side: int,
+    face: int | None = None,
+    look: Look | None = None,
+    report: Report | None = None,
+) -> FaceSeries:
+    """The face in every photo of a folder or in every frame of a video.
+
+    Args:
+        max_side: px; larger pictures are reduced to it.
+        face: as for LandmarkDetector.detect, of photos; a video's is the largest.
+        look: called with each picture that shows the face, as long as its pixels are there.
+    Raises: InputError, FileFormatError: no such source, damaged, not a video, no photo in it; a
+        `face` of a video. EstimationError: no picture shows a face.
+    """
+    kind, source = kind_of_source(source), Path(source)
+    gathered = _Gathered(source, max_side, look or (lambda pixels, landmarks: None))
+    if kind == "video":
+        if face is not None:
+            raise InputError("--face", "photos to choose a face in", f"a video, {source.name}")
+        gathered.read_video(detector, report)
+    else:
+        gathered.read_photos(detector, face, report)
+    return gathered.series()
+
+
+def load_pictures(
+    series: FaceSeries, rows: Collection[int], report: Report | None = None
+) -> Iterator[tuple[int, Photo]]:
+    """The pictures of some rows of a series with the rows, in the series' order."""
+    if not series.is_video:
+        for number, row in enumerate(sorted(rows)):
+            yield row, load_photo(series.files[row], max_side=series.max_side)
+            if report is not None:
+                report(number + 1, len(rows))
+        return
+    by_frame = {int(series.scores.index[row]): row for row in rows}
+    last = max(by_frame, default=0)
+    for index, photo in fetch_frames(
+        Video(series.source, series.quarters),
+        by_frame,
+        series.max_side,
+        lambda frame: None if report is None else report(frame + 1, last + 1),
+    ):
+        yield by_frame[index], photo
+
+
+class _Gathered:
+    """What was found so far."""
+
+    def __init__(self, source: Path, max_side: int, look: Look) -> None:
+        self.source, self.max_side, self.look = source, max_side, look
+        self.is_video = False
+        self.files: list[Path] = []
+        self.names: list[str] = []
+        self.sizes: list[tuple[int, int]] = []
+        self.seconds: list[float] = []
+        self.rows: list[tuple[int, float, DetectedFace]] = []
+        self.left_out: dict[str, str] = {}
+        self.notes: list[str] = []
+        self.told: list[tuple[str, str]] = []
+        self.quarters = 0
+
+    def read_video(self, detector: LandmarkDetector, report: Report | None) -> None:
+        """Every frame, looked at once."""
+        self.is_video = True
+        video = Video(self.source)
+        turn_upright(video, detector)
+        self.quarters = video.quarters
+        total, odd = video.facts().frames, ClipNotes()
+        with frames_ahead(video, max_side=self.max_side) as pictures:
+            for picture in pictures:
+                faces = detector.all_fast(picture.pixels)
+                odd.look(picture.pixels, faces)
+                if not faces:
+                    self.left_out[frame_name(picture.frame)] = "no face found"
+                else:
+                    found = closer(detector, picture.pixels, faces[0])
+                    self.seconds.append(picture.seconds)
+                    self._add(frame_name(picture.frame), picture.frame, picture.pixels, found)
+                if report is not None:
+                    report(picture.frame + 1, max(total, picture.frame + 1))
+        name = plain_name(self.source)
+        self.notes += [f"{name}: {note}" for note in (*video.notes, *odd.notes)]
+
+    def read_photos(
+        self, detector: LandmarkDetector, face: int | None, report: Report | None
+    ) -> None:
+        """Every photo, looked at as closely as `LandmarkDetector.detect` does."""
+        folders = photo_files(self.source)
+        self.notes += ignored_files(self.source)
+        total = sum(map(len, folders.values()))
+        number = 0
+        for folder, paths in folders.items():
+            self.notes += orphaned_annotations(paths)
+            for path in paths:
+                name = plain_name(path) if len(folders) == 1 else f"{folder}/{plain_name(path)}"
+                self._add_photo(name, number, path, detector, face)
+                number += 1
+                if report is not None:
+                    report(number, total)
+
+    def _add_photo(
+        self, name: str, number: int, path: Path, detector: LandmarkDetector, face: int | None
+    ) -> None:
+        photo = load_photo(path, max_side=self.max_side)
+        self.told += [(name, note) for note in photo.notes]
+        try:
+            landmarks = detector.detect(photo, face=face)
+        except EstimationError as error:
+            self.left_out[name] = str(error).removeprefix(f"{photo.name}: ")
+            return
+        self.told += [(name, note) for note in landmarks.notes]
+        self.files.append(path)
+        self._add(name, number, photo.pixels, landmarks.as_face())
+
+    def _add(
+        self, name: str, number: int, pixels: UInt8[Array, "h w 3"], found: DetectedFace
+    ) -> None:
+        points = found.points[:, :2]
+        self.names.append(name)
+        self.sizes.append((pixels.shape[1], pixels.shape[0]))
+        # Of long videos nothing is kept that is not needed.
+        found = replace(found, points=found.points.astype(np.float32))
+        self.rows.append((number, face_sharpness(pixels, points), found))
+        self.look(pixels, points)
+
+    def series(self) -> FaceSeries:
+        """All of it."""
+        if not self.rows:
+            what = "frames" if self.is_video else "photos"
+            reasons = [f"{name}: {reason}" for name, reason in self.left_out.items()]
+            shown = "" if self.is_video else f" ({'; '.join(reasons[:3])})"
+            raise EstimationError(f"{self.source}: no face found in any of its {what}{shown}")
+        return FaceSeries(
+            self.source,
+            self.is_video,
+            tuple(self.files),
+            tuple(self.names),
+            np.stack([found.points[:, :2] for _, _, found in self.rows]),
+            np.array(self.sizes),
+            FrameScores.of(*zip(*self.rows, strict=True)),
+            np.array(self.seconds) if self.is_video else None,
+            self.max_side,
+            self.left_out,
+            (*self.notes, *gathered_notes(self.told)),
+            self.quarters,
+        )
+
+
+def row_of(series: FaceSeries, what: str, option: str) -> int:
+    """The row of a picture that a user names: a frame's number, a file's name, its stem.
+
+    Raises: InputError: there is none; several; one that shows no face.
+    """
+    if series.is_video and what.isascii() and what.isdecimal():
+        what = frame_name(int(what))
+    rows = [row for row, name in enumerate(series.names) if what in _names_of(name)]
+    if len(rows) == 1:
+        return rows[0]
+    if rows:
+        raise InputError(option, "one picture", f"{what!r}, which names {len(rows)}")
+    for name, reason in series.left_out.items():
+        if what in _names_of(name):
+            raise InputError(option, "a picture that shows the face", f"{name}: {reason}")
+    raise InputError(option, _expected(series), what)
+
+
+def rows_of(series: FaceSeries, what: str, option: str) -> list[int]:
+    """As row_of, and all frames of a stretch where that is what the user names: `860-930`.
+
+    Raises: InputError: as row_of; a stretch without a picture that shows the face.
+    """
+    stretch = re.fullmatch(r"(\d{1,9})-(\d{1,9})", what, re.ASCII)
+    if not (series.is_video and stretch):
+        return [row_of(series, what, option)]
+    index = series.scores.index
+    rows = np.flatnonzero((index >= int(stretch[1])) & (index <= int(stretch[2])))
+    if not len(rows):
+        raise InputError(option, "a stretch of frames that show the face", what)
+    return rows.tolist()
+
+
+def _names_of(name: str) -> tuple[str, ...]:
+    path = Path(name)
+    return (name, str(path.with_suffix("")), path.name, path.stem)
+
+
+def _expected(series: FaceSeries) -> str:
+    if series.is_video:
+        last = int(series.scores.index[-1])
+        return f"the number of a frame, from 0 to {last}, or its name"
+    shown = ", ".join(series.names[:3]) + (", ..." if len(series) > 3 else "")
+    return f"the name of a photo ({shown})"

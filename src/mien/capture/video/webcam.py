@@ -1,0 +1,150 @@
+"""A camera of this computer, newest picture first."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from mien.arrays import Array, UInt8
+from mien.capture.images.photos import shrunk
+from mien.capture.video.live_source import LiveFrame
+from mien.errors import InputError
+
+PATIENCE = 10.0
+"""Seconds without a picture after which a camera has stopped; some take long to start."""
+_USUAL_RATE = 30.0
+
+
+class Capture(Protocol):
+    """What is used of cv2.VideoCapture."""
+
+    def read(self) -> tuple[bool, UInt8[Array, "h w 3"]]: ...
+
+    def get(self, prop: int, /) -> float: ...
+
+    def release(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class _BgrShot:
+    """A picture as OpenCV delivers it."""
+
+    bgr: UInt8[Array, "h w 3"]
+
+    def pixels(self, *, max_side: int | None = None) -> UInt8[Array, "h w 3"]:
+        small = self.bgr if max_side is None else shrunk(self.bgr, max_side)
+        return np.ascontiguousarray(small[..., ::-1])
+
+
+def open_camera(number: int) -> Capture:
+    """Camera 0, 1, … of this computer. Raises: InputError: there is none, or it is not ours."""
+    import cv2
+
+    log = cv2.utils.logging
+    before = log.getLogLevel()
+    log.setLogLevel(log.LOG_LEVEL_SILENT)
+    try:
+        capture: Capture = cv2.VideoCapture(number)
+        if capture.isOpened():  # type: ignore[attr-defined]
+            return capture
+    finally:
+        log.setLogLevel(before)
+    expected = "a camera that is connected, free and allowed for this program"
+    raise InputError(f"camera {number}", expected, "none")
+
+
+class Webcam:
+    """A camera that is being read by a thread, which keeps the newest picture only.
+
+    Whoever tracks slower than the camera films so misses pictures, but is never late.
+
+    Args:
+        number: 0 is the system's first.
+        opened: gives the camera. clock: seconds now. patience: seconds.
+    Raises: InputError: no such camera, or none that delivers pictures.
+    """
+
+    def __init__(
+        self,
+        number: int,
+        *,
+        opened: Callable[[int], Capture] = open_camera,
+        clock: Callable[[], float] = time.monotonic,
+        patience: float = PATIENCE,
+    ) -> None:
+        self._name, self._clock, self._patience = f"camera {number}", clock, patience
+        self.dropped = 0
+        self.notes: list[str] = []
+        self._newest: LiveFrame | None = None
+        self._changed, self._ended = threading.Condition(), False
+        capture = opened(number)
+        self.fps = _rate(capture)
+        # A daemon, so that a driver that hangs cannot keep the program from ending.
+        self._thread = threading.Thread(target=self._read, args=(capture,), daemon=True)
+        self._thread.start()
+        first = self._newer_than(-1)
+        if first is None:
+            self.close()
+            raise InputError(self._name, "a camera that delivers pictures", "one that does not")
+        self.height, self.width = first.pixels().shape[:2]
+
+    def frames(self) -> Generator[LiveFrame]:
+        """The newest picture whenever one is asked for; they end, with a note, when it stops."""
+        begin = before = None
+        while (frame := self._newer_than(-1 if before is None else before.index)) is not None:
+            begin = begin or frame
+            if before is not None:
+                self.dropped += frame.index - before.index - 1
+            before = frame
+            seconds = frame.taken - begin.taken
+            yield replace(frame, index=frame.index - begin.index, seconds=seconds)
+        count = 0 if begin is None or before is None else before.index - begin.index + 1
+        self.notes.append(f"{self._name} stopped delivering after {count} pictures")
+
+    def close(self) -> None:
+        """Let go of the camera; a second time does nothing."""
+        with self._changed:
+            self._ended = True
+        self._thread.join(self._patience)
+
+    def _read(self, capture: Capture) -> None:
+        """What the thread does: all calls of the camera, for it is not safe to share."""
+        try:
+            while not self._ended:
+                there, bgr = capture.read()
+                if not there:
+                    break
+                taken = self._clock()
+                with self._changed:
+                    index = self._last_index() + 1
+                    self._newest = LiveFrame(index, 0.0, taken, _BgrShot(bgr))
+                    self._changed.notify_all()
+        finally:
+            capture.release()
+            with self._changed:
+                self._ended = True
+                self._changed.notify_all()
+
+    def _last_index(self) -> int:
+        return -1 if self._newest is None else self._newest.index
+
+    def _newer_than(self, index: int) -> LiveFrame | None:
+        """The newest picture once there is one after this; None: none comes any more."""
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._ended or self._last_index() > index, self._patience
+            )
+            return self._newest if self._last_index() > index else None
+
+
+def _rate(capture: Capture) -> float:
+    """Frames a second as the driver states them; many state nothing."""
+    import cv2
+
+    stated = float(capture.get(cv2.CAP_PROP_FPS))
+    return stated if 1 <= stated <= 1000 else _USUAL_RATE

@@ -1,0 +1,219 @@
+"""`mien synthesize`: which options there are, and what they call."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from mien.cli.printing import Json, print_result
+from mien.cli.progress import terminal_progress
+
+if TYPE_CHECKING:
+    from mien.pipelines.synthesize_head import HeadView
+    from mien.synthesis.synthesizer import SynthesisOptions
+
+
+def synthesize(
+    examples: Annotated[
+        Path,
+        typer.Argument(help="What `mien examples` made, or a head folder that `mien build` made."),
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="OUT.png or .jpg.")],
+    points: Annotated[
+        Path | None,
+        typer.Option(
+            help="P.json, .tem or .pts: three or more feature points, px of the neutral example. "
+            "Of a head, P.json: one or more, [x, y, z] in mm of its own space."
+        ),
+    ] = None,
+    photo: Annotated[
+        Path | None,
+        typer.Option(help="A photo whose face has the expression, in whose place it is drawn."),
+    ] = None,
+    weights: Annotated[
+        Path | None,
+        typer.Option(help="W.json: which examples made which subregion, in which share."),
+    ] = None,
+    save_points: Annotated[
+        Path | None,
+        typer.Option(help="Of examples: .json, .tem or .pts: all feature points of the picture."),
+    ] = None,
+    head: Annotated[
+        Literal["auto", "still", "moved"],
+        typer.Option(
+            help="Of --points: has the head moved since the neutral example? The likelier, or so."
+        ),
+    ] = "auto",
+    face: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="Of --photo: which face, left to right from 1; the largest by default."
+        ),
+    ] = None,
+    paper: Annotated[
+        bool,
+        typer.Option("--paper", help="As Z06 prints it; the options below still count when given."),
+    ] = False,
+    propagation: Annotated[
+        Literal["closed-form", "printed"] | None,
+        typer.Option(help="All points from some: closed-form by default, printed is Z06's."),
+    ] = None,
+    distance_penalty: Annotated[
+        float | None,
+        typer.Option(help="Prefer examples that are near: 0.05 by default, Z06 has 0."),
+    ] = None,
+    slack: Annotated[
+        float | None,
+        typer.Option(help="How far shares may fall below 0; 0 by default and in Z06."),
+    ] = None,
+    upper_face_as_one: Annotated[
+        bool,
+        typer.Option(
+            "--upper-face-as-one",
+            help="Brows, lids, eyes and forehead of the same examples: fewer double brows.",
+        ),
+    ] = False,
+    yaw: Annotated[
+        float | None, typer.Option(help="Of a head: degrees; it turns to its own left.")
+    ] = None,
+    pitch: Annotated[float | None, typer.Option(help="Of a head: degrees; it tips down.")] = None,
+    size: Annotated[
+        str | None, typer.Option(help="Of a head: WIDTHxHEIGHT in px, 800x1000 by default.")
+    ] = None,
+    background: Annotated[
+        str | None,
+        typer.Option(
+            metavar="COLOUR", help="Of a head: as #204060; transparent by default in a .png."
+        ),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """The picture of an expression, from a few feature points or the face of a photo."""
+    from mien.io.head.head_folder import is_head_folder
+    from mien.pipelines.synthesize import synthesize_expression
+
+    options = _options(paper, propagation, distance_penalty, slack, upper_face_as_one)
+    view = {"--yaw": yaw, "--pitch": pitch, "--size": size, "--background": background}
+    if is_head_folder(examples):
+        wrong = {"--head": None if head == "auto" else head, "--face": face}
+        _refuse(wrong | {"--save-points": save_points}, "a set of examples")
+        _of_head(examples, output, points, photo, weights, options, not paper, view, json_)
+        return
+    _refuse(view, "a head folder")
+    if photo is None:
+        _refuse({"--face": face}, "--photo")
+    elif points is None:
+        _refuse({"--head": None if head == "auto" else head}, "--points")
+    with terminal_progress(json_) as progress:
+        made = synthesize_expression(
+            examples,
+            output,
+            points=points,
+            photo=photo,
+            weights=weights,
+            save_points=save_points,
+            options=options,
+            head=head,
+            face=face,
+            progress=progress,
+        )
+    height, width = made.synthesis.image.shape[:2]
+    data = {
+        "output": str(output),
+        "width": width,
+        "height": height,
+        "weights": None if weights is None else str(weights),
+        "hull_px": {name: round(px, 3) for name, px in made.hull_px.items()},
+        "notes": list(made.notes),
+    }
+    print_result(json_, data, f"{output}: {width}x{height}", made.notes)
+
+
+def _of_head(
+    folder: Path,
+    output: Path,
+    points: Path | None,
+    photo: Path | None,
+    weights: Path | None,
+    options: SynthesisOptions,
+    reach: bool,
+    view: dict[str, Any],
+    json_: bool,
+) -> None:
+    """The same of a head folder."""
+    from mien.pipelines.synthesize_head import synthesize_head
+
+    if photo is not None:
+        _refuse(view, "--points; a photo has its own")
+    with terminal_progress(json_) as progress:
+        made = synthesize_head(
+            folder,
+            output,
+            points=points,
+            photo=photo,
+            weights=weights,
+            options=options,
+            reach=reach,
+            view=_view(**{name.removeprefix("--"): value for name, value in view.items()}),
+            progress=progress,
+        )
+    width, height = made.size
+    data = {
+        "output": str(output),
+        "width": width,
+        "height": height,
+        "weights": None if weights is None else str(weights),
+        "hull_mm": {name: round(mm, 3) for name, mm in made.hull_mm.items()},
+        "notes": list(made.notes),
+    }
+    print_result(json_, data, f"{output}: {width}x{height}", made.notes)
+
+
+def _view(
+    yaw: float | None, pitch: float | None, size: str | None, background: str | None
+) -> HeadView:
+    from math import radians
+
+    from mien.cli.options import check_finite, parse_colour, parse_size
+    from mien.pipelines.synthesize_head import HeadView
+
+    return HeadView(
+        yaw=radians(check_finite("--yaw", yaw or 0.0)),
+        pitch=radians(check_finite("--pitch", pitch or 0.0)),
+        size=parse_size("--size", size or "800x1000"),
+        background=None if background is None else parse_colour("--background", background),
+    )
+
+
+def _refuse(options: dict[str, Any], where: str) -> None:
+    """Raises: InputError: one that was given and means nothing here."""
+    from mien.errors import InputError
+
+    for name, value in options.items():
+        if value is not None:
+            raise InputError(name, f"this only with {where}", value)
+
+
+def _options(
+    paper: bool,
+    propagation: str | None,
+    distance_penalty: float | None,
+    slack: float | None,
+    upper_face_as_one: bool,
+) -> SynthesisOptions:
+    """The paper's or the usual ones, and what was said otherwise."""
+    from dataclasses import replace
+
+    from mien.synthesis.inference.coefficients import UPPER_FACE
+    from mien.synthesis.synthesizer import SynthesisOptions
+
+    given: dict[str, Any] = {
+        "propagation": propagation,
+        "distance_penalty": distance_penalty,
+        "slack": slack,
+        "together": (UPPER_FACE,) if upper_face_as_one else None,
+    }
+    usual = SynthesisOptions.paper() if paper else SynthesisOptions()
+    return replace(usual, **{name: value for name, value in given.items() if value is not None})

@@ -1,0 +1,113 @@
+"""`examples.json`: everything about examples that is no picture and no statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.assets.feature_points import FeatureLayout
+from mien.errors import Broken
+from mien.io.head.head_json import is_inside
+from mien.reading.strict_json import (
+    as_list,
+    as_number,
+    as_object,
+    as_text,
+    join,
+    need,
+    unknown,
+)
+from mien.synthesis.examples.example_set import Example, ExampleSet
+
+FORMAT = "mien examples"
+VERSION = 1
+STATISTICS = "statistics.npz"
+
+
+def photo_file(example: Example) -> str:
+    """Where in the folder its photo lies."""
+    return f"photos/{example.name}.png"
+
+
+def examples_to_json(example_set: ExampleSet, why: Mapping[str, str]) -> dict[str, Any]:
+    """The contents of examples.json; why each example was chosen by its name."""
+    names = [example.name for example in example_set.examples]
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "layout": {
+            "name": example_set.layout.name,
+            "points": list(example_set.layout.names),
+            "pixels": "origin at the top-left corner, centre of the first pixel at (0.5, 0.5)",
+        },
+        "neutral": names[0],
+        "standard": names[example_set.standard],
+        "teeth": [names[index] for index in example_set.teeth],
+        "statistics": {"file": STATISTICS, "pictures": len(example_set.statistics)},
+        "examples": [
+            {
+                "name": example.name,
+                "source": example.source,
+                "why": why.get(example.name, ""),
+                "photo": photo_file(example),
+                "size": [example.photo.shape[1], example.photo.shape[0]],
+                "points": {
+                    name: [float(x), float(y)]
+                    for name, (x, y) in zip(example_set.layout.names, example.points, strict=True)
+                },
+            }
+            for example in example_set.examples
+        ],
+    }
+
+
+def check_layout(data: dict[str, Any], layout: FeatureLayout) -> None:
+    """The points must be those of the layout, in its order: shares and statistics rely on it.
+
+    Raises: Broken: other ones.
+    """
+    name = as_text(need(data, "name", "layout"), "layout.name")
+    points = as_list(need(data, "points", "layout"), "layout.points")
+    if name == layout.name and points == list(layout.names):
+        return
+    expected = f"the {len(layout.names)} points of {layout.name}"
+    found = f"{len(points)} of {name[:40]}" + ", other ones" * (name == layout.name)
+    raise Broken("layout", f"expected {expected}, found {found}: run `mien examples` again")
+
+
+def points_from_json(
+    value: object, place: str, layout: FeatureLayout, side: int
+) -> Float[Array, "n 2"]:
+    """(n, 2) px of points by name.
+
+    Args:
+        side: px, the photo's longer one; a point of a face that it cuts lies within one more.
+    Raises: Broken: one is missing, unknown or no place.
+    """
+    named = as_object(value, place, layout.names)
+    points = np.empty((len(layout.names), 2))
+    for index, name in enumerate(layout.names):
+        where = join(place, name)
+        pair = as_list(need(named, name, place), where)
+        if len(pair) != 2:
+            raise Broken(where, f"expected [x, y] in px, found {len(pair)} numbers")
+        points[index] = [as_number(number, where, least=-side, most=2 * side) for number in pair]
+    return points
+
+
+def index_of(name: object, place: str, names: list[str]) -> int:
+    """Which example bears a name. Raises: Broken: none; suggests the nearest."""
+    if as_text(name, place) not in names:
+        raise Broken(place, unknown("example", str(name), names))
+    return names.index(str(name))
+
+
+def photo_from_json(data: Mapping[str, Any], place: str) -> str:
+    """Where an example's photo is, within the folder. Raises: Broken: it is not."""
+    file = as_text(need(data, "photo", place), f"{place}.photo")
+    if not is_inside(file):
+        raise Broken(f"{place}.photo", f"expected a file within the folder, found {file[:60]!r}")
+    return file

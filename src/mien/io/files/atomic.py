@@ -1,0 +1,291 @@
+"""Results appear whole or not at all, and nothing that was there is lost.
+
+Everything is written under a temporary name beside its place, brought to the disk, and renamed at
+the end, so that a run that fails or is killed leaves what was there before.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import stat
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from mien.errors import InputError
+from mien.io.files.leftovers import put_back, remove_leftovers, temporary_beside
+from mien.io.files.manifest import (
+    Seen,
+    keep_late_files,
+    keep_own_files,
+    read_manifest,
+    write_manifest,
+)
+from mien.reading.names import named_path
+
+# Failures of the place that is written to; any other is the caller's own and passes through.
+_PLACE_ERRORS = {
+    errno.EACCES,
+    errno.EDQUOT,
+    errno.EEXIST,
+    errno.EFBIG,
+    errno.ELOOP,
+    errno.ENAMETOOLONG,
+    errno.ENOSPC,
+    errno.ENOTDIR,
+    errno.ENOTEMPTY,
+    errno.EPERM,
+    errno.EROFS,
+}
+
+
+_NO_SYNC = {errno.EACCES, errno.EPERM, errno.EINVAL, errno.ENOTSUP, errno.EROFS}
+"""Of files and folders that cannot be synced, as opposed to a disk that fails."""
+
+
+@contextmanager
+def atomic_file(path: str | Path) -> Iterator[Path]:
+    """A path to write to, which takes the place of `path` when the block ends without an error.
+
+    Folders above are made. The temporary name has another suffix: say the format when writing.
+
+    Raises: InputError: a folder or a device is in the way, the place cannot be written.
+    """
+    target = _target(path)
+    with _placing(path, target):
+        _check_no_folder(path, target)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        remove_leftovers(target.parent)
+        temporary = temporary_beside(target, "tmp")
+        try:
+            temporary.touch(exist_ok=False)
+            yield temporary
+            _to_disk(temporary)
+            temporary.replace(target)
+            _to_disk(target.parent)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+def check_file_place(path: str | Path) -> None:
+    """Refuse, before any work is done, a place that `atomic_file` could not take.
+
+    Raises: InputError: as atomic_file.
+    """
+    target = _target(path)
+    with _placing(path, target):
+        _check_no_folder(path, target)
+        _try_to_write(target)
+
+
+def check_files_apart(written: Iterable[str | Path], read: Iterable[str | Path] = ()) -> None:
+    """Refuse to write over what is read, and two results to one place.
+
+    Args:
+        written: files that a run writes.
+        read: files that it reads; of a folder all that mien wrote there, or all that there is where
+            no list tells (mien.io.files.manifest).
+    Raises: InputError: names the place.
+    """
+    taken = [Path(path) for path in read]
+    for path in map(Path, written):
+        for other in taken:
+            if _is_same(path, other):
+                found = "a file that is read or written as well"
+                raise InputError(path, "a place of its own", found)
+            if _belongs(path, other):
+                raise InputError(path, "a place of its own", f"a file of {other}, which is read")
+        taken.append(path)
+
+
+def check_side_file(path: str | Path, main: str | Path) -> None:
+    """Refuse a file that a result brings along and somebody else has put in its place.
+
+    Args:
+        path: whose name nobody gave: it follows from the main file's.
+        main: where that is there, it brought along what lies beside it.
+    Raises: InputError: names both.
+    """
+    if os.path.lexists(path) and not os.path.lexists(main):
+        raise InputError(path, f"a free place for what goes beside {main}", "another file there")
+
+
+@contextmanager
+def atomic_folder(
+    path: str | Path,
+    *,
+    replaces: Callable[[Path], bool],
+    read: Iterable[str | Path] = (),
+    stay: Collection[str] | None = None,
+) -> Iterator[Path]:
+    """A new folder that takes the place of `path` when the block ends without an error.
+
+    The old folder is moved aside, the new one moved in, the old one deleted; where a process is
+    killed between the two moves, the next that reads or writes the folder moves the old one back.
+
+    Args:
+        path: the folder; those above it are made.
+        replaces: says of a folder already there whether it may be replaced. An empty one may.
+        read: what the run reads and must not lie in the folder.
+        stay: given, what mien did not write into the old folder is kept in the new
+            one (io.files.manifest); at these paths, which people may change, in its place.
+    Raises: InputError: as check_folder_place; the place cannot be written.
+    """
+    check_folder_place(path, replaces=replaces, read=read)
+    target = _target(path)
+    with _placing(path, target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        remove_leftovers(target.parent)
+        temporary = temporary_beside(target, "tmp")
+        try:
+            temporary.mkdir()
+            yield temporary
+            # What came there in the meantime must not be lost either.
+            check_folder_place(path, replaces=replaces, read=read)
+            seen: Seen | None = None
+            if stay is not None:
+                write_manifest(temporary)
+                seen = keep_own_files(target, temporary, stay=stay)
+            _tree_to_disk(temporary)
+            _swap(temporary, target, seen)
+            _to_disk(target.parent)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+
+
+def check_folder_place(
+    path: str | Path, *, replaces: Callable[[Path], bool], read: Iterable[str | Path] = ()
+) -> None:
+    """Refuse, before any work is done, a place that `atomic_folder` could not take.
+
+    Raises: InputError: a file is in the way, a folder that holds something else or what is read.
+    """
+    target = _target(path)
+    put_back(target)
+    with _placing(path, target):
+        if not target.exists():
+            _try_to_write(target)
+            return
+        if not target.is_dir():
+            raise InputError(path, "a folder's name", "a file of that name")
+        if any(target.iterdir()) and not replaces(target):
+            raise InputError(
+                path, "a new folder or one made by mien", "a folder with other things in it"
+            )
+        for source in (link for given in read for link in _with_links(Path(given))):
+            if _target(source).is_relative_to(target):
+                found = f"one with {source}" if _target(source) != target else "what is read"
+                raise InputError(path, "a folder that nothing is read from", found)
+        _try_to_write(target)
+
+
+def _with_links(source: Path) -> Iterator[Path]:
+    """What is read, and the links in it, as deep as photos lie."""
+    yield source
+    for pattern in ("*", "*/*"):
+        yield from (path for path in source.glob(pattern) if path.is_symlink())
+
+
+def _check_no_folder(path: str | Path, target: Path) -> None:
+    if target.exists() and not target.is_file():
+        raise InputError(path, "a file's name", "a folder" if target.is_dir() else "a device")
+
+
+def _try_to_write(target: Path) -> None:
+    """Make a file beside it, or where the folders above it would be made, and remove it again."""
+    above = next(folder for folder in target.parents if folder.exists())
+    trial = temporary_beside(above / target.name, "tmp")
+    try:
+        trial.touch(exist_ok=False)
+        trial.unlink()
+    except OSError as error:
+        raise OSError(error.errno, os.strerror(error.errno or 0), str(target)) from error
+
+
+def _swap(new: Path, target: Path, seen: Seen | None) -> None:
+    """Args: seen: given, what is in the old folder and not among this is kept."""
+    if not target.exists():
+        new.rename(target)
+        return
+    old = temporary_beside(target, "old")
+    target.rename(old)
+    try:
+        new.rename(target)
+    except BaseException:
+        old.rename(target)
+        raise
+    if seen is not None:
+        keep_late_files(old, target, seen)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _target(path: str | Path) -> Path:
+    """Where a link leads: the link stays and what it names is replaced."""
+    return Path(os.path.realpath(named_path("output", path, "where a result goes")))
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    """One file, be it by links or by names that the disk takes for one."""
+    try:
+        return os.path.samefile(one, other)
+    except OSError:
+        return _target(one) == _target(other)
+
+
+def _belongs(path: Path, folder: Path) -> bool:
+    """Whether a file is one that a folder, which is read, is made of."""
+    inside, above = _target(path), _target(folder)
+    if not (above.is_dir() and inside.is_relative_to(above)):
+        return False
+    manifest = read_manifest(above)
+    return inside.exists() if manifest is None else _name_in(inside, above) in manifest.files
+
+
+def _name_in(path: Path, folder: Path) -> str:
+    return path.relative_to(folder).as_posix()
+
+
+def _tree_to_disk(folder: Path) -> None:
+    for top, _, names in os.walk(folder):
+        for name in names:
+            _to_disk(Path(top, name))
+        _to_disk(Path(top))
+
+
+def _to_disk(path: Path) -> None:
+    """Have the system write what it still holds, lest a power cut leave an empty file.
+
+    Not every system can do that for folders, nor for somebody else's file that is only linked in.
+    """
+    kind = path.lstat().st_mode
+    if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):
+        return
+    try:
+        handle = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+    except OSError as error:
+        if error.errno not in _NO_SYNC:
+            raise
+
+
+@contextmanager
+def _placing(path: str | Path, target: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _PLACE_ERRORS or not _concerns(target, error.filename):
+            raise
+        reason = os.strerror(error.errno)
+        raise InputError(path, "a place that can be written to", reason) from error
+
+
+def _concerns(target: Path, file: str | bytes | int | None) -> bool:
+    """Whether a failure at this file is one of writing the target: at it, above it or beside it."""
+    if not isinstance(file, str):
+        return True
+    return target.is_relative_to(file) or Path(file).is_relative_to(target.parent)

@@ -1,0 +1,92 @@
+"""TRACK.json: what the numbers in the TRACK.csv beside it mean."""
+
+from __future__ import annotations
+
+import json
+from importlib.metadata import version
+from pathlib import Path
+
+from mien.errors import Broken, FileFormatError, InputError
+from mien.limits import MAX_FPS, MAX_PHOTO_SIDE, MIN_FPS
+from mien.reading.strict_json import (
+    as_names,
+    as_number,
+    as_whole,
+    check_format,
+    need,
+    read_json,
+)
+from mien.track.state import Layout, Track
+
+FORMAT = "mien track"
+VERSION = 1
+
+
+def sidecar_of(path: str | Path) -> Path:
+    """TRACK.json beside TRACK.csv. Raises: InputError: a name that does not end in .csv."""
+    path = Path(path)
+    if path.suffix.lower() != ".csv":
+        raise InputError(path, "a name that ends in .csv", path.suffix or "no suffix")
+    return path.with_suffix(".json")
+
+
+def check_sidecar(path: Path) -> None:
+    """Refuse to write over a file that is no track's, such as a timeline of the same name.
+
+    Raises: InputError.
+    """
+    if not path.exists():
+        return
+    try:
+        described = read_json(path).get("format") == FORMAT
+    except (InputError, FileFormatError):
+        described = False
+    if not described:
+        expected = "no file of this name, or that of an older track: it goes with the .csv"
+        raise InputError(path, expected, "another file")
+
+
+def sidecar_text(track: Track) -> str:
+    """The contents of TRACK.json."""
+    layout = track.layout
+    data = {
+        "format": FORMAT,
+        "version": VERSION,
+        "generator": f"mien {version('mien')}",
+        "width": track.width,
+        "height": track.height,
+        "focal_px": float(track.focal_px),
+        "fps": float(track.fps),
+        "regions": list(layout.regions),
+        "expressions": list(layout.expressions),
+        "units": list(layout.units),
+    }
+    return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def load_sidecar(path: Path) -> Track:
+    """A track without frames.
+
+    Raises: InputError: no such file. FileFormatError: not a track's, a newer version, a key that
+        is missing or holds something else.
+    """
+    if not path.exists():
+        expected = "the file that goes with the .csv and says what its numbers mean"
+        raise InputError(path, expected, "no such file")
+    data = read_json(path)
+    try:
+        check_format(data, FORMAT, VERSION)
+        width, height = (
+            as_whole(need(data, key, ""), key, above=0, most=MAX_PHOTO_SIDE)
+            for key in ("width", "height")
+        )
+        focal_px = as_number(need(data, "focal_px", ""), "focal_px", above=0)
+        fps = as_number(need(data, "fps", ""), "fps", least=MIN_FPS, most=MAX_FPS)
+        names = (as_names(need(data, key, ""), key) for key in ("regions", "expressions", "units"))
+        layout = Layout(*names)
+    except Broken as broken:
+        raise FileFormatError(path, broken.problem, broken.place) from None
+    except InputError as error:
+        problem = f"expected {error.expected}, found {error.got}"
+        raise FileFormatError(path, problem, error.name) from None
+    return Track(layout, width, height, focal_px, fps, ())

@@ -1,0 +1,230 @@
+"""`mien animate`: a head performs a timeline, into whatever file is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mien.animate.perform import frames_of, moved_camera
+from mien.animate.timeline import Moment, Timeline
+from mien.arrays import Array, UInt8
+from mien.errors import FileFormatError, InputError
+from mien.head import NEUTRAL, Head
+from mien.io.files.atomic import check_file_place, check_files_apart
+from mien.io.timeline.timeline_check import check_timeline
+from mien.io.timeline.timeline_file import load_performance, performance_files
+from mien.pipelines.explained import units_of
+from mien.render.picture import GREY, HeadRenderer
+from mien.rig.state import FaceState
+
+if TYPE_CHECKING:
+    from mien.pipelines.build import Progress
+
+SIZE = (720, 900)
+"""Of pictures, px, unless the timeline or the user says."""
+STAGE = "Animating"
+
+
+@dataclass(frozen=True)
+class Take:
+    """What came of a performance.
+
+    Attributes:
+        frames: how many were written.
+        notes: what the user should know, such as weights past what was photographed.
+    """
+
+    frames: int
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One head's performance, frame by frame, before one camera."""
+
+    renderer: HeadRenderer
+    timeline: Timeline
+    fps: float
+    size: tuple[int, int]
+    yaw: float
+    pitch: float
+    background: tuple[int, int, int] | None
+    tell: Callable[[int, int], None] = field(repr=False)
+
+    @cached_property
+    def times(self) -> Array:
+        return frames_of(self.timeline, self.fps)
+
+    def moments(self) -> Iterator[Moment]:
+        """One a frame; tells how far it is."""
+        times = self.times
+        self.tell(0, len(times))
+        for index, moment in enumerate(self.timeline.moments_at(times), 1):
+            yield moment
+            self.tell(index, len(times))
+
+    def pictures(self, background: tuple[int, int, int] | None) -> Iterator[UInt8[Array, "h w c"]]:
+        """One a frame: with alpha where there is no background."""
+        camera = self.renderer.camera(self.yaw, self.pitch, size=self.size)
+        for moment in self.moments():
+            seen_from = moved_camera(camera, moment)
+            picture = self.renderer.draw(moment.state, seen_from, background=background)
+            yield picture if background is None else np.ascontiguousarray(picture[..., :3])
+
+
+def animate_head(
+    head: Head,
+    timeline: Timeline | str | Path,
+    path: str | Path,
+    *,
+    fps: float | None = None,
+    size: tuple[int, int] | None = None,
+    yaw: float = 0.0,
+    pitch: float = 0.0,
+    background: tuple[int, int, int] | None = None,
+    read: Iterable[str | Path] = (),
+    progress: Progress | None = None,
+) -> Take:
+    """Let a head perform a timeline; frames are made one at a time, and a run that is stopped
+    leaves what was there.
+
+    Args:
+        timeline: or the file that holds one (io.timeline.timeline_file.load_performance).
+        path: what to write, by its suffix: .mp4, .webm, .glb, .usdz, .csv (Live Link Face), .fap
+            (MPEG-4); a name without one, or with a slash at its end, is a folder of pictures.
+        fps: frames a second; the timeline's unless given.
+        size: width and height of pictures, px; the timeline's unless given.
+        yaw, pitch: radians, how the head is turned before it moves; for pictures.
+        background: sRGB. Unless given, pictures and .webm have alpha and an .mp4 a plain grey.
+        read: files and folders beside the timeline that must stay as they are, such as the head's.
+        progress: told the stage, the frames done and their total.
+    Raises: InputError: another suffix, a place that is read or cannot be written, a rate that a
+        .fap cannot say. FileFormatError: the timeline; what in it the head cannot do, by place;
+        more than MAX_FRAMES.
+    """
+    files = [] if isinstance(timeline, Timeline) else performance_files(timeline)
+    write = _writer(path, [*files, *read])
+    name = timeline if isinstance(timeline, (str, Path)) else "timeline"
+    played = timeline if isinstance(timeline, Timeline) else load_performance(timeline)
+    check_timeline(played, expressions=head.expressions, units=head.unit_names, path=name)
+    tell = progress or (lambda stage, done, total: None)
+    job = _Job(
+        renderer=HeadRenderer(head),
+        timeline=played,
+        fps=played.fps if fps is None else fps,
+        size=size or played.size or SIZE,
+        yaw=yaw,
+        pitch=pitch,
+        background=background,
+        tell=lambda done, total: tell(STAGE, done, total),
+    )
+    try:
+        _ = job.times
+    except InputError as error:
+        problem = f"expected {error.expected}, found {error.got}"
+        raise FileFormatError(name, problem, error.name) from None
+    notes = (*played.notes, *_hull_notes(job, name))
+    return Take(write(job, path), notes)
+
+
+def _hull_notes(job: _Job, name: str | Path) -> tuple[str, ...]:
+    """What goes beyond the photographed expressions, and when farthest; before a frame is drawn.
+
+    Raises: FileFormatError: weights that no face may have, and when.
+    """
+    rig = job.renderer.rig
+    farthest: dict[str, tuple[float, float, Mapping[str, float]]] = {}
+    for moment in job.timeline.moments_at(job.times):
+        try:
+            rig.hull_notes(moment.state)
+        except InputError as error:
+            raise FileFormatError(name, str(error), f"at {moment.time:.2f} s") from None
+        for region, weights in moment.state.expressions.items():
+            beyond = _beyond(weights)
+            if region not in farthest or beyond > farthest[region][0]:
+                farthest[region] = beyond, moment.time, weights
+    return tuple(
+        f"{note} at {time:.2f} s"
+        for region, (_, time, weights) in farthest.items()
+        for note in rig.hull_notes(FaceState({region: weights}))
+    )
+
+
+def _beyond(weights: Mapping[str, float]) -> float:
+    """How far the farthest weight, neutral's too, lies outside of 0 to 1; negative inside."""
+    given = list(weights.values())
+    every = given if NEUTRAL in weights else [1 - sum(given), *given]
+    return max(max(-weight, weight - 1) for weight in every)
+
+
+def _writer(path: str | Path, read: Iterable[str | Path]) -> Callable[[_Job, str | Path], int]:
+    """By suffix. Raises: InputError: no such kind, a place that is read, a folder that holds other
+    things."""
+    from mien.io.files.frames import check_frames_place
+
+    suffix = Path(path).suffix.lower()
+    if str(path).endswith("/") or not suffix:
+        check_frames_place(path, read=read)
+        return _write_pictures
+    if suffix not in _WRITERS:
+        kinds = f"a name that ends in {', '.join(_WRITERS)}, or a folder's"
+        raise InputError(path, kinds, suffix)
+    check_files_apart([path], read)
+    check_file_place(path)
+    return _WRITERS[suffix]
+
+
+def _write_pictures(job: _Job, path: str | Path) -> int:
+    from mien.io.files.frames import write_frames
+
+    return write_frames(path, job.pictures(job.background))
+
+
+def _write_video(job: _Job, path: str | Path) -> int:
+    from mien.io.files.video import write_video
+
+    opaque = Path(path).suffix.lower() == ".mp4"
+    background = job.background or (GREY if opaque else None)
+    return write_video(path, job.pictures(background), job.fps)
+
+
+def _write_model(job: _Job, path: str | Path) -> int:
+    from mien.io.mesh.export import export_head
+    from mien.io.timeline.performance import performance
+
+    animation = performance(job.renderer.head, job.moments(), job.renderer.rig.evaluate)
+    export_head(job.renderer.head, path, animation=animation)
+    return len(animation.times)
+
+
+def _write_live_link(job: _Job, path: str | Path) -> int:
+    from mien.io.live.live_link import write_live_link
+
+    head = job.renderer.head
+    return write_live_link(path, job.moments(), units_of=lambda state: units_of(head, state))
+
+
+def _write_fap(job: _Job, path: str | Path) -> int:
+    from mien.io.timeline.fap import FapMeter, write_fap
+
+    meter = FapMeter.of(job.renderer.head.mesh.vertices)
+    values = (
+        meter.read(job.renderer.rig.evaluate(moment.state).vertices, moment.rotation)
+        for moment in job.moments()
+    )
+    return write_fap(path, values, job.fps)
+
+
+_WRITERS: dict[str, Callable[[_Job, str | Path], int]] = {
+    ".mp4": _write_video,
+    ".webm": _write_video,
+    ".glb": _write_model,
+    ".usdz": _write_model,
+    ".csv": _write_live_link,
+    ".fap": _write_fap,
+}

@@ -1,0 +1,79 @@
+"""A known head found in one photo: where it is, and what its face does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.assets.generic import load_generic_head
+from mien.camera import Camera
+from mien.capture.faces.detector import LandmarkDetector
+from mien.capture.faces.landmarks import cut_note
+from mien.capture.images.photos import Photo, shrunk
+from mien.errors import EstimationError
+from mien.head import Head
+from mien.pipelines.tracking.ready_head import ReadyHead
+from mien.rig.rig import Rig
+from mien.synthesis.heads.points import feature_points_on
+from mien.track.lens import expected_focal
+from mien.track.tracker import STRANGE_RMS, TrackOptions
+
+__all__ = ["UNLIKE", "HeadInPhoto", "find_head"]
+
+UNLIKE = "the face does not look like the head's: another person's, or in other light"
+
+_SIDE = 1280
+"""px: in larger photos nothing more is found."""
+
+
+@dataclass(frozen=True)
+class HeadInPhoto:
+    """A head and its face in a photo.
+
+    Attributes:
+        points: (n, 3) mm, head space, the feature points of the face.
+        camera: of the photo, in its own pixels.
+        rig: of the head.
+        notes: what the user should know.
+    """
+
+    points: Float[Array, "n 3"]
+    camera: Camera
+    rig: Rig
+    notes: tuple[str, ...] = ()
+
+
+def find_head(head: Head, photo: Photo) -> HeadInPhoto:
+    """The face of a photo that looks like the head's, as the head makes it; some seconds.
+
+    It is fitted to the photo's pixels, as in the frames of a video. Where none looks like them
+    then, head and face are taken from the landmarks of the largest alone.
+
+    Raises: EstimationError: no face, one too small, none that the head fits. InputError: as `Rig`.
+    """
+    width, height = photo.size
+    focal = photo.focal_prior_px or expected_focal(head, width, height).focal_px
+    pixels = np.ascontiguousarray(shrunk(photo.pixels, _SIDE))
+    with LandmarkDetector() as detector:
+        largest = detector.detect(photo)  # Says what is wrong before the head is made ready.
+        ready = ReadyHead(head, detector, TrackOptions())
+        # The tracker sees upright faces only.
+        start = ready.starter.fit(largest.as_face(), size=photo.size, focal_px=focal)
+        tracked = [
+            ready.tracker(width, height, focal).step(pixels, 0, 0.0, where)
+            for where in (None, start)
+        ]
+    own = min(tracked, key=lambda frame: np.nan_to_num(frame.rms, nan=np.inf))
+    like = own.state is not None and own.rms <= STRANGE_RMS
+    state = own.state if like else start and start.state
+    if state is None:
+        raise EstimationError(f"{photo.name}: no face found that fits the head")
+    face = ready.model.rig.evaluate(state.face(ready.model.layout))
+    camera = Camera(width, height, focal, state.R_cam_head, state.t_cam_head)
+    places = camera.project(load_generic_head().landmark_positions(face.vertices))
+    notes = [f"{photo.name}: {note}" for note in cut_note(places, photo.size)]
+    if not like:
+        notes.append(f"{photo.name}: {UNLIKE}; its points come from landmarks alone")
+    return HeadInPhoto(feature_points_on(face.vertices), camera, ready.model.rig, tuple(notes))

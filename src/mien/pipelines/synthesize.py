@@ -1,0 +1,129 @@
+"""`mien synthesize`: an expression's picture from feature points, or from the face of a photo."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mien.io.examples.example_folder import load_examples
+from mien.io.examples.weights_json import write_weights
+from mien.io.files.image import save_image
+from mien.io.landmarks.points_file import check_points_kind, write_points
+from mien.pipelines.synthesize_target import (
+    HeadChoice,
+    Target,
+    check_request,
+    target_from_photo,
+    target_from_points,
+)
+from mien.synthesis.examples.example_set import ExampleSet
+from mien.synthesis.inference.input_checks import face_width
+from mien.synthesis.synthesizer import Synthesis, SynthesisOptions, Synthesizer
+
+if TYPE_CHECKING:
+    from mien.pipelines.build import Progress
+
+__all__ = ["HULL_SHARE", "Synthesized", "hull_note", "synthesize_expression"]
+
+READING, FINDING, DRAWING = "Reading the examples", "Finding the face", "Drawing"
+
+HULL_SHARE = 0.01
+"""Face widths by which a subregion may leave what its examples reach before it is told of.
+
+Of held-out frames of two clips, 40 examples each, 5 in 100 subregions leave it so far, in a fifth
+of the frames; their PSNR is 1 to 2 dB below the same subregion's usual one, and from
+0.0125 on 2 to 4 dB.
+"""
+
+
+@dataclass(frozen=True)
+class Synthesized:
+    """What came of it.
+
+    Attributes:
+        synthesis: the picture and its shares.
+        hull_px: of each subregion, as `Synthesis.hull_px`.
+        notes: what the user should know.
+    """
+
+    synthesis: Synthesis
+    hull_px: dict[str, float]
+    notes: tuple[str, ...]
+
+
+def synthesize_expression(
+    folder: str | Path,
+    output: str | Path,
+    *,
+    points: str | Path | None = None,
+    photo: str | Path | None = None,
+    weights: str | Path | None = None,
+    save_points: str | Path | None = None,
+    options: SynthesisOptions | None = None,
+    head: HeadChoice = "auto",
+    face: int | None = None,
+    progress: Progress | None = None,
+) -> Synthesized:
+    """Draw an expression of the person in an example folder and write the picture.
+
+    Args:
+        output: .png or .jpg.
+        points: a file of feature points, px of the neutral photo; or
+        photo: whose face has the expression; the picture gets its size, and the head its place.
+        weights: W.json, which examples made which subregion.
+        save_points: .json, .tem or .pts: where all points are, px of the picture.
+        head: of `points`, as for `target_from_points`.
+        face: of `photo`, which one; the largest unless given.
+        progress: told the stage, steps done and their total.
+    Raises: InputError: neither or both of points and photo, a place that cannot be written, points
+        that cannot be meant. FileFormatError, EstimationError: as `load_examples`,
+        `target_from_points`, `target_from_photo`.
+    """
+    tell = progress or (lambda stage, done, total: None)
+    check_request(folder, points, photo, output, weights, save_points)
+    if save_points is not None:
+        check_points_kind(save_points)
+    tell(READING, 0, 0)
+    synthesizer = Synthesizer(load_examples(folder), options)
+    tell(READING, 1, 1)
+    tell(FINDING if photo else DRAWING, 0, 0)
+    if photo is not None:
+        target = target_from_photo(synthesizer, photo, face=face)
+        tell(FINDING, 1, 1)
+    else:
+        assert points is not None
+        target = target_from_points(synthesizer, points, head=head)
+    made = _drawn(synthesizer, target)
+    save_image(output, made.synthesis.image)
+    if weights is not None:
+        shares, hull_px = made.synthesis.coefficients, made.synthesis.hull_px
+        write_weights(weights, synthesizer.examples, shares, hull_px)
+    if save_points is not None:
+        write_points(save_points, synthesizer.examples.layout, made.synthesis.points)
+    tell(DRAWING, 1, 1)
+    return made
+
+
+def hull_note(examples: ExampleSet, hull_px: dict[str, float]) -> str | None:
+    """Which subregions are asked for more than the examples show, the worst first."""
+    width = face_width(examples.layout, examples.neutral.points)
+    beyond = sorted(hull_px.items(), key=lambda item: -item[1])
+    told = [
+        f"{name.replace('_', ' ')} {px:.1f} px ({px / width:.1%})"
+        for name, px in beyond
+        if px > HULL_SHARE * width
+    ]
+    if not told:
+        return None
+    bound = f"more than {HULL_SHARE:.0%} of the face's width"
+    return f"beyond what the examples show, by {bound}: {', '.join(told)}"
+
+
+def _drawn(synthesizer: Synthesizer, target: Target) -> Synthesized:
+    made = synthesizer.synthesize(target.points, motion=target.motion, size=target.size)
+    names = synthesizer.examples.subregions.names
+    hull_px = dict(zip(names, made.hull_px.tolist(), strict=True))
+    beyond = hull_note(synthesizer.examples, hull_px)
+    notes = (*target.notes, *([beyond] if beyond else []))
+    return Synthesized(made, hull_px, notes)

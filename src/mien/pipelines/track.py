@@ -1,0 +1,147 @@
+"""`mien track`: the performance in a video, frame by frame, into a table."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING
+
+from mien.arrays import check_positive
+from mien.capture.faces.detector import LandmarkDetector
+from mien.capture.video.orientation import turn_upright
+from mien.capture.video.video import Video
+from mien.head import Head
+from mien.io.tracks.track_journal import journal_of
+from mien.pipelines.track_lens import LENS, find_focal
+from mien.pipelines.tracking.notes import check_found, track_notes
+from mien.pipelines.tracking.outputs import OVERLAY, TrackFiles
+from mien.pipelines.tracking.ready_head import ReadyHead
+from mien.pipelines.tracking.run import TRACKING, TrackRun
+from mien.reading.names import named_path
+from mien.track.lens import parse_lens
+from mien.track.smoothing import smooth
+from mien.track.state import STATUSES, Status, Track
+from mien.track.tracker import TrackOptions
+
+if TYPE_CHECKING:
+    from mien.pipelines.build import Progress
+
+MAX_SIDE = 1920
+"""px; larger pictures are tracked reduced to it. Reducing smaller ones would take longer than it
+saves: a face is compared at a size of its own anyway."""
+COUNTED = (LENS, TRACKING, OVERLAY)
+"""Stages whose steps are frames."""
+STARTED_OVER = "the run that was not finished was started over; it could have been resumed"
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """What came of a video.
+
+    Attributes:
+        frames: how many. counts: of these, by status.
+        resumed: of these, how many an earlier run had tracked.
+        fps: frames tracked a second, decoding included; None where there was none to track.
+        rms: grey levels, the median of the frames'; None where all were lost.
+        focal_px: of the video's pictures.
+        notes: what the user should know.
+    """
+
+    frames: int
+    counts: dict[Status, int]
+    resumed: int
+    fps: float | None
+    rms: float | None
+    focal_px: float
+    notes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """`448 frames, 2 found again, 3 lost, 31.2 frames/s, error 6.1 grey levels`"""
+        parts = [
+            f"{self.frames} frames",
+            f"{self.resumed} from before" * bool(self.resumed),
+            f"{self.counts['reacquired']} found again" * bool(self.counts["reacquired"]),
+            f"{self.counts['lost']} lost" * bool(self.counts["lost"]),
+            "" if self.fps is None else f"{self.fps:.1f} frames/s",
+            "" if self.rms is None else f"error {self.rms:.1f} grey levels",
+        ]
+        return ", ".join(filter(None, parts))
+
+
+def track_video(
+    video: str | Path,
+    head: Head,
+    files: TrackFiles,
+    *,
+    lens: str | None = None,
+    smooth_seconds: float | None = None,
+    resume: bool = False,
+    options: TrackOptions | None = None,
+    max_side: int = MAX_SIDE,
+    progress: Progress | None = None,
+) -> Tracked:
+    """Track a head through a video and write what was found, each file whole or not at all.
+
+    Every frame goes into a journal beside the table at once. A run that is stopped leaves it; one
+    that resumes goes on from there and gives the same files, byte for byte, as an unbroken one.
+
+    Args:
+        lens: as for track.lens.parse_lens; estimated over the first frames unless given.
+        smooth_seconds: as track.smoothing.smooth; nothing is smoothed unless given.
+        resume: go on where an earlier run was stopped; from the start where there was none.
+        max_side: px; larger pictures are tracked reduced to it.
+        progress: told the stage, the frames done and their total.
+    Raises: InputError, FileFormatError: before any work is done, a video or a place that cannot be
+        used, a lens, a journal of another run. EstimationError: when all is written, a video
+        whose frames are all lost.
+    """
+    tell = progress or (lambda stage, done, total: None)
+    clip = Video(named_path("video", video, "a video"))
+    files.check(clip.path)
+    if smooth_seconds is not None:
+        check_positive("smooth_seconds", smooth_seconds)
+    facts = clip.facts()
+    focal_px = None if lens is None else parse_lens(lens, facts.width, facts.height)
+    notes = [STARTED_OVER] if journal_of(files.table).exists() and not resume else []
+    with LandmarkDetector() as detector:
+        if turn_upright(clip, detector):
+            facts = clip.facts()
+            focal_px = None if lens is None else parse_lens(lens, facts.width, facts.height)
+        ready = ReadyHead(head, detector, options or TrackOptions())
+        if focal_px is None:
+            focal_px, note = find_focal(clip, facts, ready, tell)
+            notes.append(note)
+        run = TrackRun(clip, facts, ready, focal_px, max_side)
+        tracker = run.tracker()
+        journal, kept = run.journal(files.table, tracker.layout, resume=resume)
+        with journal:
+            start = time.perf_counter()
+            frames = run.follow(tracker, journal, kept, tell)
+            seconds = time.perf_counter() - start
+            track = run.track(tracker.layout, frames)
+            shown = track if smooth_seconds is None else smooth(track, smooth_seconds)
+            others = tracker.met_others
+            notes += [*clip.notes, *track_notes(track, head, met_others=others)]
+            notes += files.write(shown, clip, head, tell)
+            journal.remove()
+    check_found(track, clip.path, files.table, met_others=others)
+    return _summary(track, len(kept), seconds, notes)
+
+
+def _summary(track: Track, resumed: int, seconds: float, notes: Sequence[str]) -> Tracked:
+    found = Counter(frame.status for frame in track.frames)
+    count = len(track.frames)
+    errors = [frame.rms for frame in track.frames if frame.state is not None]
+    return Tracked(
+        frames=count,
+        counts={status: found[status] for status in STATUSES},
+        resumed=resumed,
+        fps=(count - resumed) / seconds if count > resumed else None,
+        rms=median(errors) if errors else None,
+        focal_px=track.focal_px,
+        notes=tuple(notes),
+    )

@@ -1,0 +1,209 @@
+"""Live tracking: pictures as they come, a packet to every receiver for each."""
+
+from __future__ import annotations
+
+import time
+from array import array
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing, suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from statistics import median
+from typing import Protocol
+
+from mien.animate.from_track import FACING
+from mien.animate.timeline import Moment
+from mien.arrays import Array, UInt8
+from mien.capture.video.live_source import LiveSource, PacedVideo
+from mien.head import Head
+from mien.pipelines.explained import units_of
+from mien.pipelines.tracking.streams import Stream, parse_stream
+from mien.track.state import Layout, Status, TrackedFrame
+
+_RECENT = 30  # frames over which the rate that is shown is counted
+
+
+class LiveTracker(Protocol):
+    """What tracks; `mien.track.tracker.Tracker` does."""
+
+    layout: Layout
+
+    def step(self, pixels: UInt8[Array, "h w 3"], frame: int, time: float) -> TrackedFrame: ...
+
+
+class Receiver(Protocol):
+    """Who is told of every frame; `mien.pipelines.tracking.streams.Stream` is one."""
+
+    def send(self, moment: Moment | None, seconds: float) -> None: ...
+
+
+@dataclass(frozen=True)
+class LiveStatus:
+    """How it goes at one frame.
+
+    Attributes:
+        frame: its number. status: how it was found.
+        fps: frames a second lately; 0 at the first. latency: seconds from picture to packet.
+        dropped: pictures that came too soon, so far.
+    """
+
+    frame: int
+    status: Status
+    fps: float
+    latency: float
+    dropped: int
+
+
+@dataclass(frozen=True)
+class LiveSummary:
+    """How it went.
+
+    Attributes:
+        frames: tracked ones. lost: those of them without a face. dropped: pictures left out.
+        seconds: from the first packet to the last. fps: frames a second; 0 of a single frame.
+        latency: median seconds from picture to packet; None where there was no frame.
+        notes: what was odd.
+    """
+
+    frames: int
+    lost: int
+    dropped: int
+    seconds: float
+    fps: float
+    latency: float | None
+    notes: tuple[str, ...] = ()
+
+
+def run_live(
+    source: str,
+    head: Head,
+    make_tracker: Callable[[LiveSource], LiveTracker],
+    streams: Sequence[str] = (),
+    *,
+    seconds: float | None = None,
+    max_side: int | None = None,
+    record: Callable[[TrackedFrame], None] = lambda frame: None,
+    tell: Callable[[LiveStatus], None] = lambda status: None,
+) -> LiveSummary:
+    """What `mien track 0` does: open source and streams, track, close them again.
+
+    Args:
+        source: a camera's number or a video, as for `open_source`.
+        make_tracker: called once, with the source open.
+        streams: addresses, as for `parse_stream`.
+        seconds, max_side, record, tell: as for `track_live`.
+    Raises: InputError, FileFormatError: before anything is tracked, a source or a stream that
+        cannot be opened.
+    """
+    addresses = [parse_stream(text) for text in streams]
+    with ExitStack() as stack:
+        opened = [Stream(address, partial(units_of, head)) for address in addresses]
+        for stream in opened:
+            stack.enter_context(closing(stream))
+        live = stack.enter_context(closing(open_source(source)))
+        summary = track_live(
+            live,
+            make_tracker(live),
+            opened,
+            seconds=seconds,
+            max_side=max_side,
+            record=record,
+            tell=tell,
+        )
+        notes = (note for stream in opened for note in stream.notes)
+        return replace(summary, notes=(*summary.notes, *notes))
+
+
+def open_source(text: str) -> LiveSource:
+    """`0`, `1`, … for a camera of this computer; anything else is a video that stands in for one.
+
+    Raises: InputError, FileFormatError: no such camera, no such video.
+    """
+    from mien.capture.video.webcam import Webcam
+
+    return Webcam(int(text)) if text.isdecimal() and text.isascii() else PacedVideo(text)
+
+
+def track_live(
+    source: LiveSource,
+    tracker: LiveTracker,
+    receivers: Sequence[Receiver] = (),
+    *,
+    seconds: float | None = None,
+    max_side: int | None = None,
+    record: Callable[[TrackedFrame], None] = lambda frame: None,
+    tell: Callable[[LiveStatus], None] = lambda status: None,
+    clock: Callable[[], float] = time.monotonic,
+) -> LiveSummary:
+    """Track until the source ends, Ctrl-C, or so many seconds of the source.
+
+    Args:
+        tracker: made for the source's width and height.
+        max_side: px; larger pictures are tracked reduced to it.
+        record: told every tracked frame, for a file that is written in the end.
+        tell: told after every packet.
+        clock: the source's.
+    """
+    from threadpoolctl import threadpool_limits
+
+    meter = _Meter()
+    one_thread = threadpool_limits(1, user_api="blas")
+    with one_thread, closing(source.frames()) as pictures, suppress(KeyboardInterrupt):
+        for picture in pictures:
+            if seconds is not None and picture.seconds >= seconds:
+                break
+            pixels = picture.pixels(max_side=max_side)
+            frame = tracker.step(pixels, picture.index, picture.seconds)
+            moment = moment_of(frame, tracker.layout)
+            for receiver in receivers:
+                receiver.send(moment, frame.time)
+            record(frame)
+            tell(meter.count(frame, clock(), picture.taken, source.dropped))
+    return meter.summary(source)
+
+
+def moment_of(frame: TrackedFrame, layout: Layout) -> Moment | None:
+    """Face and head as the camera sees them: a head at rest faces it. None: a lost frame."""
+    state = frame.state
+    if state is None:
+        return None
+    rotation, translation = FACING.T @ state.R_cam_head, FACING.T @ state.t_cam_head
+    return Moment(frame.time, state.face(layout), rotation, translation)
+
+
+@dataclass
+class _Meter:
+    """Counts frames as they are sent."""
+
+    frames: int = 0
+    lost: int = 0
+    first: float = 0.0
+    recent: deque[float] = field(default_factory=lambda: deque(maxlen=_RECENT))
+    latencies: array[float] = field(default_factory=lambda: array("d"))
+
+    def count(self, frame: TrackedFrame, now: float, taken: float, dropped: int) -> LiveStatus:
+        if not self.frames:
+            self.first = now
+        self.frames += 1
+        self.lost += frame.state is None
+        self.recent.append(now)
+        self.latencies.append(now - taken)
+        fps = _rate(len(self.recent), now - self.recent[0])
+        return LiveStatus(frame.frame, frame.status, fps, now - taken, dropped)
+
+    def summary(self, source: LiveSource) -> LiveSummary:
+        seconds = self.recent[-1] - self.first if self.recent else 0.0
+        return LiveSummary(
+            frames=self.frames,
+            lost=self.lost,
+            dropped=source.dropped,
+            seconds=seconds,
+            fps=_rate(self.frames, seconds),
+            latency=median(self.latencies) if self.frames else None,
+            notes=tuple(source.notes),
+        )
+
+
+def _rate(count: int, seconds: float) -> float:
+    return (count - 1) / seconds if seconds > 0 else 0.0

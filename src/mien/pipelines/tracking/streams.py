@@ -1,0 +1,169 @@
+"""Where live tracking goes: `livelink://127.0.0.1:11111`, `vmc://192.168.0.7`."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Protocol
+from urllib.parse import SplitResult, urlsplit
+
+import numpy as np
+
+from mien.animate.timeline import Moment
+from mien.errors import InputError
+from mien.io.live import live_link_udp, vmc
+from mien.io.live.live_link import values_of
+from mien.rig.state import FaceState
+
+HOST, SUBJECT = "127.0.0.1", "mien"
+PORTS = {"livelink": live_link_udp.PORT, "vmc": vmc.PORT}
+
+_AT_REST = Moment(0.0, FaceState(), np.eye(3), np.zeros(3))
+
+UnitsOf = Callable[[FaceState], Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class StreamAddress:
+    """Who receives the packets.
+
+    Attributes:
+        protocol: "livelink" or "vmc". host, port: where.
+        subject: the name under which Unreal lists a Live Link stream.
+    """
+
+    protocol: str
+    host: str
+    port: int
+    subject: str = SUBJECT
+
+    def __str__(self) -> str:
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{self.protocol}://{host}:{self.port}"
+
+
+def parse_stream(text: str) -> StreamAddress:
+    """`livelink://HOST:PORT/SUBJECT` or `vmc://HOST:PORT`; this computer and the usual port unless
+    given. Raises: InputError: neither, or no port.
+    """
+    try:
+        parts = urlsplit(text)
+        port = parts.port
+    except ValueError as error:
+        raise InputError("--stream", "livelink://HOST:PORT or vmc://HOST:PORT", error) from None
+    subject = parts.path.strip("/")
+    if parts.scheme not in PORTS or _more(parts) or (subject and parts.scheme == "vmc"):
+        raise InputError("--stream", "livelink://HOST:PORT or vmc://HOST:PORT", text)
+    if port == 0:
+        raise InputError("--stream", "a port from 1 to 65535", port)
+    host = parts.hostname or HOST
+    return StreamAddress(parts.scheme, host, port or PORTS[parts.scheme], subject or SUBJECT)
+
+
+def _more(parts: SplitResult) -> bool:
+    """Whether an address says things that mean nothing here."""
+    return bool(parts.query or parts.fragment or "@" in parts.netloc)
+
+
+class Encoder(Protocol):
+    """One protocol's packets."""
+
+    def found(self, moment: Moment, given: Mapping[str, float]) -> bytes:
+        """Of a face that was found; `given`: the units that stand for it."""
+
+    def lost(self, seconds: float) -> bytes | None:
+        """Of one that was not; None: nothing is sent."""
+
+
+@dataclass(frozen=True)
+class LiveLinkEncoder:
+    """Packets of Live Link Face.
+
+    Attributes:
+        subject: the stream's name. begin: seconds since midnight at time 0 of the moments.
+    """
+
+    subject: str
+    begin: float
+
+    def found(self, moment: Moment, given: Mapping[str, float]) -> bytes:
+        seconds, values = self.begin + moment.time, values_of(moment, given)
+        return live_link_udp.encode(live_link_udp.Packet(self.subject, seconds, values))
+
+    def lost(self, seconds: float) -> None:
+        # Unreal keeps the last values and shows by itself that nothing new comes.
+        return None
+
+
+@dataclass(frozen=True)
+class VmcEncoder:
+    """Bundles of the VMC protocol."""
+
+    def found(self, moment: Moment, given: Mapping[str, float]) -> bytes:
+        return vmc.encode_face(moment, given)
+
+    def lost(self, seconds: float) -> bytes:
+        return vmc.encode_lost(seconds)
+
+
+class Stream:
+    """Packets to one receiver over UDP; nobody knows whether it listens.
+
+    A packet that cannot be sent is counted and forgotten: the next one follows soon.
+
+    Args:
+        units_of: the units that stand for a face.
+    Raises: InputError: a host that cannot be found, a subject that is too long.
+    """
+
+    def __init__(self, address: StreamAddress, units_of: UnitsOf) -> None:
+        self.address, self._units_of = address, units_of
+        self._encoder = _encoder_of(address)
+        # A subject that cannot be sent is told now; and what is slow once is done before it counts.
+        self._encoder.found(_AT_REST, {})
+        self._failed, self._reason = 0, ""
+        family, self._target = _resolved(address)
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+
+    def send(self, moment: Moment | None, seconds: float) -> None:
+        """A frame at its time; None where the face is lost."""
+        if moment is None:
+            data = self._encoder.lost(seconds)
+        else:
+            data = self._encoder.found(moment, self._units_of(moment.state))
+        try:
+            if data is not None:
+                self._socket.sendto(data, self._target)
+        except OSError as error:
+            self._failed += 1
+            self._reason = error.strerror or str(error)
+
+    @property
+    def notes(self) -> list[str]:
+        if not self._failed:
+            return []
+        return [f"{self.address}: {self._failed} packets could not be sent ({self._reason})"]
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def _encoder_of(address: StreamAddress) -> Encoder:
+    if address.protocol == "vmc":
+        return VmcEncoder()
+    now = datetime.now()
+    midnight = now.replace(hour=0, minute=0, second=0, microsecond=0)
+    return LiveLinkEncoder(address.subject, (now - midnight).total_seconds())
+
+
+def _resolved(address: StreamAddress) -> tuple[int, tuple]:
+    """The kind of socket, and what it wants to be told."""
+    try:
+        found = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)
+    except (OSError, UnicodeError):
+        raise InputError("--stream", "a host that can be found", address.host) from None
+    family, _, _, _, target = found[0]
+    return family, target

@@ -1,0 +1,179 @@
+"""One photo matched with another through the head's surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Bool, Float, Shaped
+from mien.mesh import Mesh
+from mien.numeric.images.optical_flow import local_correlation, match_images, normalize_contrast
+from mien.numeric.kernels.threads import side_by_side
+from mien.numeric.raster.rasterizer import interpolate
+from mien.reconstruction.dense.crops import Crop
+
+KEPT_DETAIL_MM = 10.0
+"""Patterns larger than this are taken for shading and removed before matching."""
+LEAST_FACING = 0.25
+"""Cosine between the surface's normal and the direction to the camera."""
+ROUND_TRIP_PX = 1.0
+"""From a to b and back: a match that returns farther off is wrong."""
+LEAST_CORRELATION = 0.6
+_BEHIND_PX, _BEHIND_MM = 4.0, 3.0
+"""A point this far behind the depth map of another view is hidden there."""
+_FEW = 100
+"""Pixels that two views must share for a match to be tried."""
+_MARGIN_PX = 8
+"""Around what two views share: as much as is matched at once."""
+_EDGE_PX = 2
+"""At the edge of a crop, where interpolation lacks neighbours."""
+_ALL = 0.99
+"""A mask interpolated between its pixels: all of them are in it."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """A crop with the surface behind its pixels.
+
+    Attributes:
+        points: (H, W, 3) mm. facing: (H, W) cosine between normal and direction to the camera.
+        usable: (H, W) where the head is seen squarely enough.
+    """
+
+    crop: Crop
+    points: Float[Array, "h w 3"]
+    facing: Float[Array, "h w"]
+    usable: Bool[Array, "h w"]
+
+    @classmethod
+    def of(cls, crop: Crop, mesh: Mesh, normals: Float[Array, "v 3"]) -> Sight:
+        both = np.concatenate([mesh.vertices, normals], axis=1)
+        at = interpolate(crop.raster, mesh.triangles, both)
+        points, normal = np.ascontiguousarray(at[..., :3]), at[..., 3:]
+        towards = crop.camera.center.astype(np.float32) - points
+        lengths = np.sqrt(_dot(towards, towards) * _dot(normal, normal))
+        facing = _dot(towards, normal) / np.maximum(lengths, 1e-9)
+        return cls(crop, points, facing, crop.raster.mask & (facing > LEAST_FACING))
+
+
+@dataclass(frozen=True)
+class Match:
+    """Where the pixels of crop a lie in crop b.
+
+    Attributes:
+        places: (H, W, 2) px of crop b. good: (H, W) seen in both and alike.
+    """
+
+    places: Float[Array, "h w 2"]
+    good: Bool[Array, "h w"]
+
+
+Checked = tuple[Match, Float[Array, "h w"]]
+"""A match and by how many px the way back misses."""
+
+
+def match_sights(a: Sight, b: Sight, *, fine: bool = False) -> Match | None:
+    """Where b shows what each pixel of a shows; None where they share next to nothing.
+
+    Photo b is drawn through the surface as a's camera would see it, which takes out pose and
+    foreshortening but for the errors of cameras and surface: those are what is matched.
+    """
+    import cv2
+
+    predicted, shared = _predict(a, b)
+    if np.count_nonzero(shared) < _FEW:
+        return None
+    window = _around(shared)
+    there, mask = predicted[window], shared[window]
+    radius = KEPT_DETAIL_MM / 2 * a.crop.camera.focal_px / float(a.crop.camera.t_cam_head[2])
+    ours = normalize_contrast(a.crop.grey[window], mask, radius)
+    theirs = normalize_contrast(_sample(b.crop.grey, there, cv2.INTER_CUBIC), mask, radius)
+    moved = match_images(ours, theirs, fine=fine) + _centres(mask)
+    alike = local_correlation(ours, _sample(theirs, moved)) > LEAST_CORRELATION
+    within = _sample(mask.astype(np.float32), moved) > _ALL
+    inside = cv2.erode(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    places, good = np.zeros_like(predicted), np.zeros_like(shared)
+    places[window], good[window] = _sample(there, moved), alike & within & inside
+    return Match(places, good)
+
+
+def match_both(a: Sight, b: Sight, *, fine: bool = False) -> tuple[Checked, Checked] | None:
+    """a's pixels in b and b's in a, checked by each other; None where they share nothing.
+
+    Args:
+        fine: as in match_images.
+    """
+    there, back = side_by_side(
+        lambda: match_sights(a, b, fine=fine), lambda: match_sights(b, a, fine=fine)
+    )
+    if there is None or back is None:
+        return None
+    return check_match(there, back), check_match(back, there)
+
+
+def check_match(there: Match, back: Match) -> Checked:
+    """The match and by how many px of a the way back misses; what misses too far is no good."""
+    off = _sample(back.places, there.places) - _centres(there.good)
+    miss = np.hypot(off[..., 0], off[..., 1])
+    good = there.good & (_sample(back.good.astype(np.float32), there.places) > _ALL)
+    return Match(there.places, good & (miss < ROUND_TRIP_PX)), miss
+
+
+def _predict(a: Sight, b: Sight) -> tuple[Float[Array, "h w 2"], Bool[Array, "h w"]]:
+    """Where b sees the surface behind a's pixels, and which of them both see."""
+    import cv2
+
+    camera = b.crop.camera
+    # Single precision is good to 1e-4 px.
+    in_camera = cv2.transform(a.points, np.column_stack([camera.R_cam_head, camera.t_cam_head]))
+    depth = np.maximum(in_camera[..., 2], 1.0)
+    scale = np.float32(camera.focal_px) / depth
+    x, y = (in_camera[..., i] * scale + np.float32(camera.principal[i]) for i in range(2))
+    predicted = np.stack([x, y], axis=-1)
+    nearest = _sample(b.crop.raster.depth, predicted, cv2.INTER_NEAREST)
+    facing = _sample(b.facing, predicted, cv2.INTER_NEAREST)
+    slack = max(_BEHIND_MM, _BEHIND_PX * float(camera.t_cam_head[2]) / camera.focal_px)
+    within = (x > _EDGE_PX) & (x < camera.width - _EDGE_PX)
+    within &= (y > _EDGE_PX) & (y < camera.height - _EDGE_PX)
+    shared: Array = a.usable & within & (depth < nearest + slack) & (facing > LEAST_FACING)
+    return predicted, shared
+
+
+def _around(mask: Bool[Array, "h w"]) -> tuple[slice, slice]:
+    """The rows and columns that hold all of the mask, and a margin."""
+    height, width = mask.shape
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return (
+        slice(max(rows[0] - _MARGIN_PX, 0), min(rows[-1] + 1 + _MARGIN_PX, height)),
+        slice(max(columns[0] - _MARGIN_PX, 0), min(columns[-1] + 1 + _MARGIN_PX, width)),
+    )
+
+
+def _centres(image: Shaped[Array, "h w"]) -> Float[Array, "h w 2"]:
+    """Of its pixels, px."""
+    height, width = image.shape
+    x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)
+    return np.stack(np.meshgrid(x + 0.5, y + 0.5), axis=-1)
+
+
+def _dot(a: Float[Array, "h w 3"], b: Float[Array, "h w 3"]) -> Float[Array, "h w"]:
+    product: Array = np.einsum("hwi,hwi->hw", a, b)
+    return product
+
+
+def _sample(
+    values: Float[Array, "h w ..."], places: Float[Array, "h w 2"], how: int = 1
+) -> Float[Array, "h w ..."]:
+    """Values at places in px, 0 outside of the image; `how` is one of OpenCV's interpolations."""
+    import cv2
+
+    found: Array = cv2.remap(
+        np.asarray(values, np.float32),
+        places.astype(np.float32) - np.float32(0.5),
+        None,
+        how,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=0,
+    )
+    return found

@@ -1,0 +1,253 @@
+"""The rounds of dense registration: follow, solve, move the surface, look closer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.assets.generic import GenericHead
+from mien.camera import Camera
+from mien.capture.source import View
+from mien.mesh import Mesh
+from mien.numeric.rotation import angle_between
+from mien.reconstruction.dense.crops import finest_mm_per_px, visible_mesh
+from mien.reconstruction.dense.eyes import seat_eyes
+from mien.reconstruction.dense.joint import (
+    JointSolution,
+    Lenses,
+    PlacePrior,
+    Sightings,
+    solve_jointly,
+)
+from mien.reconstruction.dense.prior import HeadPrior, load_head_prior
+from mien.reconstruction.dense.quality import FEW_PLACES, Quality, judge_registration
+from mien.reconstruction.dense.surface import NO_OFFSETS, Offsets, measure_offsets, move_surface
+from mien.reconstruction.dense.surface_tracks import NO_TRACKS, Tracks, find_tracks
+from mien.reconstruction.dense.uncertainty import vertex_deviation
+from mien.reconstruction.features import Features
+from mien.reconstruction.shape.deformation import deform_head
+from mien.reconstruction.triangulation import intersect_rays
+
+SCALES_MM = (2.0, 1.2, 0.8, 0.5)
+"""What a pixel shows, from round to round."""
+FINEST_MM = 0.4
+"""The same for the last look, at the surface alone."""
+PLACES, FINE_PLACES = 1800, 20_000
+"""Places followed in a round, and in the last look."""
+ALONG_SD_MM, ACROSS_SD_MM = 10.0, 1.0
+"""How far a place of the surface lies off the prior, along the surface (where the mesh may have
+slid) and across it."""
+HAIR_SD_MM = 10.0
+"""Across the surface where hair covers it."""
+INDEPENDENT_PLACES = 150
+"""What the prior does not express goes together over 15 to 20 mm of skin: however many places are
+followed on a face, they tell no more of the prior's coefficients than so many."""
+ATTACHED_SD_MM, NAMED_SD_MM = 1.5, 6.0
+"""How far a landmark's place lies off its attachment on the prior, and a hand-made mark's off the
+vertex of its name: people differ in what they mean by one, and marks count in the end, not here."""
+LANDMARK_SHARE = 4.0
+"""Landmarks err together, not each by itself: so many times their sigma."""
+SETTLED_RAD = np.deg2rad(1.0)
+COARSE_ROUNDS = 4
+ENOUGH_PLACES = 150
+"""Fewer places shared by all photos together tell nothing."""
+
+
+@dataclass(frozen=True)
+class Registration:
+    """What the photos together tell.
+
+    Attributes:
+        cameras: one a photo. vertices: (V, 3) mm, in the prior's frame and scale.
+        deviation_mm: (V,) standard deviation of each vertex, all axes together.
+        quality: what the photos say of each other.
+    """
+
+    cameras: tuple[Camera, ...]
+    vertices: Float[Array, "v 3"]
+    deviation_mm: Float[Array, " v"]
+    quality: Quality
+
+
+def register_views(
+    views: Sequence[View],
+    cameras: Sequence[Camera],
+    vertices: Float[Array, "v 3"],
+    features: Features,
+    lenses: Lenses,
+    generic: GenericHead,
+    *,
+    scales: Sequence[float] = SCALES_MM,
+    progress: Callable[[int, int], None] | None = None,
+) -> Registration | None:
+    """Cameras and shape from all the skin that the photos share, from coarse to fine.
+
+    Args:
+        cameras, vertices: from landmarks, within some 15 degrees.
+        features: landmarks and marks of the same photos. Landmarks tell what place of the mesh
+            is which, and lead the camera of a photo that shares too little with the others; marks
+            lead all cameras, and the head passes through them in the end.
+        scales: mm a px, from round to round.
+    Returns: None where the photos share too little that looks alike.
+    """
+    tell = progress or (lambda done, total: None)
+    prior = load_head_prior()
+    problem = _Problem(views, features, lenses, generic, prior, _rotations(cameras))
+    state = _State(tuple(cameras), vertices)
+    scales = _useful(scales, cameras)
+    for step, scale in enumerate(scales):
+        tell(step, len(scales) + 1)
+        for _ in range(COARSE_ROUNDS if step == 0 else 1):
+            before, tracks = state.cameras, problem.tracks(state, scale, PLACES)
+            if len(tracks.corners) < ENOUGH_PLACES:
+                return None
+            state, solution = problem.round(state, tracks)
+            if _largest_turn(before, state.cameras) < SETTLED_RAD:
+                break
+    tell(len(scales), len(scales) + 1)
+    finest = problem.tracks(state, max(FINEST_MM, finest_mm_per_px(state.cameras)), FINE_PLACES)
+    vertices, offsets = problem.moved(state.vertices, finest, state.cameras)
+    vertices = seat_eyes(_on_marks(vertices, features, state.cameras, generic), generic)
+    count = len(solution.coefficients)
+    deviation = vertex_deviation(
+        solution.covariance[-count:, -count:], prior, finest, offsets, generic
+    )
+    tell(len(scales) + 1, len(scales) + 1)
+    quality = judge_registration(tracks, solution, generic)
+    return Registration(state.cameras, vertices, deviation, quality)
+
+
+def deviation_by_features(
+    views: Sequence[View],
+    cameras: Sequence[Camera],
+    vertices: Float[Array, "v 3"],
+    features: Features,
+    lenses: Lenses,
+    generic: GenericHead,
+) -> Float[Array, " v"]:
+    """(V,) mm: standard deviation of a head that landmarks and marks alone tell (one photo)."""
+    prior = load_head_prior()
+    problem = _Problem(views, features, lenses, generic, prior, _rotations(cameras))
+    solution = problem.solve(_State(tuple(cameras), vertices), NO_TRACKS)
+    count = len(solution.coefficients)
+    covariance = solution.covariance[-count:, -count:]
+    return vertex_deviation(covariance, prior, NO_TRACKS, NO_OFFSETS, generic)
+
+
+@dataclass(frozen=True)
+class _State:
+    cameras: tuple[Camera, ...]
+    vertices: Float[Array, "v 3"]
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """What stays the same from round to round."""
+
+    views: Sequence[View]
+    features: Features
+    lenses: Lenses
+    generic: GenericHead
+    prior: HeadPrior
+    anchors: Float[Array, "k 3 3"]
+
+    def round(self, state: _State, tracks: Tracks) -> tuple[_State, JointSolution]:
+        """Solve for all, then move the surface."""
+        solution = self.solve(state, tracks)
+        vertices = self.prior.vertices(solution.coefficients)
+        vertices, _ = self.moved(vertices, tracks, solution.cameras)
+        return _State(solution.cameras, vertices), solution
+
+    def tracks(self, state: _State, scale: float, places: int) -> Tracks:
+        """Places of the surface that several photos show."""
+        mesh = visible_mesh(self.generic, state.vertices)
+        return find_tracks(self.views, state.cameras, mesh, mm_per_px=scale, places=places)
+
+    def moved(
+        self, vertices: Float[Array, "v 3"], tracks: Tracks, cameras: Sequence[Camera]
+    ) -> tuple[Float[Array, "v 3"], Offsets]:
+        """The surface where the photos put it."""
+        offsets = measure_offsets(tracks, cameras, self.generic.mesh.with_vertices(vertices))
+        return move_surface(vertices, tracks, offsets, self.generic), offsets
+
+    def solve(self, state: _State, tracks: Tracks) -> JointSolution:
+        """Tracks and features together: places on the mesh, what photos show of them, beliefs."""
+        features, prior = self.features, self.prior
+        photo, feature = np.nonzero(features.seen)
+        by_hand = features.by_hand[photo, feature]
+        sigma = features.sigma_px(state.cameras)[photo, feature]
+        # Landmarks lead a camera only where nothing better does.
+        alone = np.bincount(tracks.photo, minlength=len(self.views)) < FEW_PLACES
+        leading = by_hand | alone[photo]
+        sigma = np.where(leading, sigma, LANDMARK_SHARE * sigma)
+        crowding = np.sqrt(tracks.crowding)[tracks.place]
+        sightings = Sightings(
+            photo=np.append(tracks.photo, photo),
+            place=np.append(tracks.place, feature + len(tracks.corners)),
+            image_points=np.concatenate(
+                [tracks.image_points, features.image_points[photo, feature]]
+            ),
+            sigma_px=np.append(tracks.sigma_px * crowding, sigma),
+            guides=np.append(np.ones(len(tracks.photo), bool), leading),
+        )
+
+        def on(values: Array) -> Array:
+            return np.concatenate([tracks.on(values), features.on(values)], axis=-2)
+
+        attached_sd = np.where(features.by_hand.any(axis=0), NAMED_SD_MM, ATTACHED_SD_MM)
+        attached = np.eye(3) / attached_sd[:, None, None] ** 2
+        mesh = self.generic.mesh.with_vertices(state.vertices)
+        beliefs = PlacePrior(
+            on(prior.mean),
+            on(prior.components),
+            np.concatenate([_skin_precision(tracks, mesh, self.generic), attached]),
+        )
+        return solve_jointly(
+            state.cameras, on(state.vertices), sightings, beliefs, self.lenses, anchors=self.anchors
+        )
+
+
+def _on_marks(
+    vertices: Float[Array, "v 3"],
+    features: Features,
+    cameras: Sequence[Camera],
+    generic: GenericHead,
+) -> Float[Array, "v 3"]:
+    """The head moved so that what was marked by hand lies where the photos show it."""
+    marked = features.by_hand.any(axis=0)
+    if not marked.any():
+        return vertices
+    image = np.where(features.by_hand[..., None], features.image_points, np.nan)[:, marked]
+    places = features.on(vertices)[marked]
+    goals = intersect_rays(cameras, image, current=places).points
+    deviation = np.where(features.by_hand, features.sigma_mm, np.inf).min(axis=0)[marked]
+    return deform_head(vertices, places, goals, generic, deviation_mm=deviation)
+
+
+def _rotations(cameras: Sequence[Camera]) -> Float[Array, "k 3 3"]:
+    return np.stack([camera.R_cam_head for camera in cameras])
+
+
+def _largest_turn(before: Sequence[Camera], after: Sequence[Camera]) -> float:
+    return float(angle_between(_rotations(before), _rotations(after)).max())
+
+
+def _useful(scales: Sequence[float], cameras: Sequence[Camera]) -> list[float]:
+    """No finer than the photos, once as fine as they are."""
+    finest = finest_mm_per_px(cameras)
+    return sorted({max(scale, finest) for scale in scales}, reverse=True)
+
+
+def _skin_precision(tracks: Tracks, mesh: Mesh, generic: GenericHead) -> Float[Array, "n 3 3"]:
+    """(N, 3, 3) 1 / mm^2: how near the surface's places lie to the prior, by direction."""
+    normals = tracks.on(mesh.vertex_normals())
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    across = normals[:, :, None] * normals[:, None, :]
+    hair = tracks.on(generic.regions["scalp"][:, None])[:, 0]
+    across_sd = ACROSS_SD_MM + hair * (HAIR_SD_MM - ACROSS_SD_MM)
+    along: Array = (np.eye(3) - across) / ALONG_SD_MM**2
+    share = min(1.0, INDEPENDENT_PLACES / max(len(normals), 1))
+    return share * (along + across / across_sd[:, None, None] ** 2)

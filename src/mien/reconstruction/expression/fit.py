@@ -1,0 +1,240 @@
+"""One expression of a person whose neutral head is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.assets.generic import GenericHead
+from mien.camera import Camera
+from mien.capture.faces.detector import NO_FACE
+from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
+from mien.capture.source import View
+from mien.errors import EstimationError
+from mien.numeric.rotation import angle_between
+from mien.reconstruction.expression.gaze import MOST_RAD, iris_directions, yaw_pitch_of
+from mien.reconstruction.expression.known_head import KnownHead, feature_sightings
+from mien.reconstruction.expression.skin_tracking import follow_skin
+from mien.reconstruction.expression.unit_fit import Explained, explain
+from mien.reconstruction.features import gather_features
+from mien.reconstruction.landmark_fit import focal_beliefs, residuals_of
+from mien.reconstruction.observations import Sightings, measure_misses
+from mien.reconstruction.outliers import PhotoFit, find_misfit, judge_marks, typical_misfits
+from mien.reconstruction.resection import LEAST_FEATURES, place_cameras
+from mien.reconstruction.shape.skin import move_skin
+
+FOLLOWED_MM = (1.6, 0.8)
+"""What a pixel shows while skin is followed, from round to round."""
+SAME_LENS_SD = 0.003
+"""Of the log focal length of a frame of the clip that the neutral photos come from."""
+MOST_OFF_MM, MOST_TURN_RAD = 2.5, np.deg2rad(8.0)
+"""Skin found again lies 0.8 to 1.7 mm off what the units express, in the median, and turns cameras
+by 1 to 6 degrees from where landmarks put them. Skin that is somebody else's does more."""
+STRANGE_SKIN = "{}: its skin does not look like neutral's: its shape rests on landmarks and marks"
+_STEADY = ("eyeLook", "tongueOut")
+"""Units that landmarks do not tell: gaze has the irises, the tongue has nothing."""
+_CLOSED = 0.5
+"""Weight of a blink at which an iris cannot be seen any more."""
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class ExpressionFit:
+    """An expression in the neutral head's frame.
+
+    Attributes:
+        vertices: (V, 3) mm, head space, eyeballs as in neutral.
+        units: (52,) weights of the face units that explain it.
+        gaze: (2, 2) rad, yaw and pitch of the left and the right eye beyond where they look in
+            neutral.
+        photos: by photo name, those that fit. left_out: why, by photo name, the others did not.
+    """
+
+    vertices: Float[Array, "v 3"]
+    units: Float[Array, " 52"]
+    gaze: Float[Array, "2 2"]
+    photos: dict[str, PhotoFit]
+    left_out: dict[str, str]
+    notes: tuple[str, ...] = ()
+
+
+def fit_expression(
+    views: Sequence[View], known: KnownHead, *, progress: Progress | None = None
+) -> ExpressionFit:
+    """Cameras, face units and shape of an expression, from one photo on.
+
+    Cameras and units come together from landmarks and marks, then again with the skin that is
+    found again from the neutral photos; what is left moves the skin smoothly. Depth that the
+    photos do not tell is the units'.
+
+    Raises: EstimationError: no photo can be used; says why, of each.
+    Source: P02 sec. 5.1 with the neutral head as the prior; the units and the dense matching are
+        ours.
+    """
+    from threadpoolctl import threadpool_limits
+
+    tell = progress or (lambda done, total: None)
+    left_out = {view.photo.name: NO_FACE for view in views if not view.marked}
+    views = [view for view in views if view.marked]
+    counts = gather_features(views, known.generic).seen.sum(axis=1) if views else []
+    for view, count in zip(views, counts, strict=True):
+        if count < LEAST_FEATURES:
+            left_out[view.photo.name] = f"{count} points are too few for a camera"
+    views = [view for view in views if view.photo.name not in left_out]
+    with threadpool_limits(1, user_api="blas"):
+        while views:
+            found = _fit(views, known, tell)
+            misfit = find_misfit(found.typical_misfits)
+            if misfit is None:
+                return replace(found.fit, left_out=left_out)
+            worst, why = misfit
+            left_out[views[worst].photo.name] = why
+            views = [view for k, view in enumerate(views) if k != worst]
+    raise EstimationError("; ".join(f"{name}: {why}" for name, why in left_out.items()))
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A fit, and how many expected errors each photo's marks lie off, in the median."""
+
+    fit: ExpressionFit
+    typical_misfits: Float[Array, " k"]
+
+
+def _fit(views: Sequence[View], known: KnownHead, tell: Progress) -> _Found:
+    generic = known.generic
+    features = gather_features(views, generic)
+    focal, focal_sd = _lenses(views, known)
+    sightings = feature_sightings(features, known)
+    expected = _expected_units(views, known)
+    free = np.array([not name.startswith(_STEADY) for name in generic.unit_names])
+    cameras = place_cameras(views, features, focal, known.vertices)
+    start = Explained(cameras, np.where(free, expected, 0.0))
+
+    def explained(seen: Sightings, before: Explained) -> Explained:
+        return explain(seen, before, expected, focal_sd, known, free=free)
+
+    found = by_marks = explained(sightings, start)
+    vertices, everything, held = found.vertices(known), sightings, _held(generic)
+    for step, scale in enumerate(FOLLOWED_MM):
+        tell(step, len(FOLLOWED_MM))
+        vertices = move_skin(vertices, everything, found.cameras, generic, held=held)
+        everything = _with_skin(sightings, views, found.cameras, vertices, known, scale)
+        found = explained(everything, found)
+        strange = _strange_skin(everything, len(sightings.photo), found, by_marks, known)
+        if strange:
+            everything = _without_skin(everything, len(sightings.photo), strange)
+            found = explained(everything, by_marks)
+        vertices = found.vertices(known)
+    vertices = move_skin(vertices, everything, found.cameras, generic, held=held)
+    tell(len(FOLLOWED_MM), len(FOLLOWED_MM))
+    residuals = residuals_of(features, found.cameras, vertices)
+    sigma_px = features.sigma_px(found.cameras)
+    photos = {
+        view.photo.name: PhotoFit(camera, judge_marks(features, k, residuals[k], sigma_px[k]))
+        for k, (view, camera) in enumerate(zip(views, found.cameras, strict=True))
+    }
+    notes = tuple(STRANGE_SKIN.format(views[k].photo.name) for k in strange)
+    fit = ExpressionFit(vertices, found.weights, _gaze(views, found, known), photos, {}, notes)
+    return _Found(fit, typical_misfits(residuals, sigma_px))
+
+
+def _strange_skin(
+    sightings: Sightings, first: int, found: Explained, by_marks: Explained, known: KnownHead
+) -> list[int]:
+    """Photos whose skin is not neutral's: what was found again contradicts itself or the marks.
+
+    Args:
+        first: number of the first sighting of skin.
+    """
+    misses = measure_misses(sightings, sightings.on(found.vertices(known)), found.cameras)
+    strange = []
+    for k, (camera, before) in enumerate(zip(found.cameras, by_marks.cameras, strict=True)):
+        mine = np.flatnonzero(sightings.photo[first:] == k) + first
+        if not len(mine):
+            continue
+        mm_per_px = float(camera.t_cam_head[2]) / camera.focal_px
+        off = float(np.median(np.linalg.norm(misses.residuals[mine], axis=1))) * mm_per_px
+        turned = float(angle_between(camera.R_cam_head, before.R_cam_head))
+        if off > MOST_OFF_MM or turned > MOST_TURN_RAD:
+            strange.append(k)
+    return strange
+
+
+def _without_skin(sightings: Sightings, first: int, photos: Sequence[int]) -> Sightings:
+    skin = np.arange(len(sightings.photo)) >= first
+    return sightings.of(~(skin & np.isin(sightings.photo, photos)))
+
+
+def _lenses(
+    views: Sequence[View], known: KnownHead
+) -> tuple[Float[Array, " k"], Float[Array, " k"]]:
+    """(K,) focal lengths, px, and the standard deviation of their logarithms."""
+    beliefs = focal_beliefs(views)
+    focal, deviation = beliefs.focal_px.copy(), beliefs.deviation.copy()
+    for k, view in enumerate(views):
+        for other, camera in zip(known.views, known.cameras, strict=True):
+            if view.photo.path == other.photo.path:
+                focal[k], deviation[k] = camera.focal_px, SAME_LENS_SD
+    return focal, deviation
+
+
+def _expected_units(views: Sequence[View], known: KnownHead) -> Float[Array, " 52"]:
+    """(52,) what the detector scores above the neutral photos, as shares of what is left to 1."""
+    rest, scores = (
+        np.mean(
+            [view.landmarks.blendshapes for view in group if view.landmarks] or [np.zeros(52)], 0
+        )
+        for group in (known.views, views)
+    )
+    share = np.clip((scores - rest) / np.maximum(1 - rest, 0.2), 0, 1)
+    by_name = dict(zip(BLENDSHAPE_NAMES, share, strict=True))
+    return np.array([by_name.get(name, 0.0) for name in known.generic.unit_names])
+
+
+def _with_skin(
+    sightings: Sightings,
+    views: Sequence[View],
+    cameras: Sequence[Camera],
+    vertices: Float[Array, "v 3"],
+    known: KnownHead,
+    scale: float,
+) -> Sightings:
+    """The sightings and the skin that is found again."""
+    for k, (view, camera) in enumerate(zip(views, cameras, strict=True)):
+        skin = follow_skin(view, camera, vertices, known, photo=k, mm_per_px=scale)
+        if skin is not None:
+            sightings = sightings.joined(skin)
+    return sightings
+
+
+def _held(generic: GenericHead) -> Float[Array, " v"]:
+    """(V,) in [0, 1]: hair and ears stay."""
+    still = sum(generic.regions[name] for name in ("scalp", "left_ear", "right_ear"))
+    held: Array = np.minimum(np.asarray(still), 1.0)
+    return held
+
+
+def _gaze(views: Sequence[View], found: Explained, known: KnownHead) -> Float[Array, "2 2"]:
+    """(2, 2) rad, beyond neutral's; 0 of an eye that is shut."""
+    generic = known.generic
+
+    def mean(group: Sequence[View], cameras: Sequence[Camera]) -> Array | None:
+        seen = [
+            iris_directions(view, camera, known.vertices, generic)
+            for view, camera in zip(group, cameras, strict=True)
+        ]
+        directions = [item for item in seen if item is not None]
+        return yaw_pitch_of(np.mean(directions, axis=0)) if directions else None
+
+    rest, now = mean(known.views, known.cameras), mean(views, found.cameras)
+    if rest is None or now is None:
+        return np.zeros((2, 2))
+    blinks = [generic.unit_names.index(f"eyeBlink{side}") for side in ("Left", "Right")]
+    seen = found.weights[blinks] < _CLOSED
+    turned: Array = np.clip(now - rest, -MOST_RAD, MOST_RAD) * seen[:, None]
+    return turned

@@ -1,0 +1,85 @@
+"""What is known of a person before an expression is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.assets.generic import GenericHead
+from mien.camera import Camera
+from mien.capture.source import View
+from mien.reconstruction.features import EDGE_SIGMA_MM, Features, gather_features
+from mien.reconstruction.observations import Sightings
+
+EXPRESSED_EDGE_MM = 0.8
+"""How far a landmark on an edge lies off its place on this person's head, once that is known."""
+EXPRESSED_SKIN_MM = 2.5
+"""The same for one on plain skin, which the detector guesses from the edges."""
+_HALF_BELIEVED = 1.25
+"""Confidence, summed over neutral photos, at which half of what they say of a landmark's place is
+believed: one says little, for landmarks slide from view to view."""
+
+
+@dataclass(frozen=True)
+class KnownHead:
+    """A person's neutral head.
+
+    Attributes:
+        views, cameras: the photos that it was fitted to. vertices: (V, 3) mm, head space.
+        units: (52, V, 3) mm, the face units of this head.
+    """
+
+    views: Sequence[View]
+    cameras: Sequence[Camera]
+    vertices: Float[Array, "v 3"]
+    units: Float[Array, "52 v 3"]
+    generic: GenericHead
+
+
+def feature_sightings(features: Features, known: KnownHead) -> Sightings:
+    """Landmarks and marks of an expression's photos, corrected by what the neutral ones say.
+
+    A detector means by a landmark a place that differs from person to person, but hardly between a
+    person's expressions: where the neutral photos show it off its attachment, it is there in the
+    others, too.
+    """
+    # Irises lie on the eyeballs, which turn by themselves.
+    on_face = known.generic.regions["face"][features.corners].max(axis=1) > 0
+    photo, column = np.nonzero(features.seen & (on_face | features.by_hand))
+    beside = _beside(features, known)
+    landmark = ~features.by_hand[photo, column]
+    on_edge = features.sigma_mm[photo, column] <= 2 * EDGE_SIGMA_MM
+    sigma = np.where(on_edge, EXPRESSED_EDGE_MM, EXPRESSED_SKIN_MM)
+    return Sightings(
+        corners=features.corners[column],
+        barycentrics=features.barycentrics[column],
+        beside=beside[column],
+        photo=photo,
+        image_points=features.image_points[photo, column],
+        sigma_mm=np.where(landmark, sigma, features.sigma_mm[photo, column]),
+    )
+
+
+def _beside(features: Features, known: KnownHead) -> Float[Array, "n 3"]:
+    """(N, 3) mm, by which the neutral photos show each landmark off its place, on average."""
+    seen = gather_features(known.views, known.generic)
+    column_of = {name: column for column, name in enumerate(seen.names)}
+    total, weight = np.zeros((len(seen.names), 3)), np.zeros(len(seen.names))
+    places = seen.on(known.vertices)
+    for k, camera in enumerate(known.cameras):
+        off = seen.image_points[k] - camera.project(places)
+        mm_per_px = camera.to_camera(places)[:, 2] / camera.focal_px
+        usable = seen.seen[k] & ~seen.by_hand[k]
+        confidence = np.where(usable, EDGE_SIGMA_MM / seen.sigma_mm[k], 0.0)
+        moved = (off * mm_per_px[:, None]) @ camera.R_cam_head[:2]
+        total[usable] += (confidence[:, None] * moved)[usable]
+        weight += confidence
+    mean = total / (weight + _HALF_BELIEVED)[:, None]
+    beside = np.zeros((len(features.names), 3))
+    for n, name in enumerate(features.names):
+        if name in column_of:
+            beside[n] = mean[column_of[name]]
+    return beside

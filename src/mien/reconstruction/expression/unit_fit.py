@@ -1,0 +1,127 @@
+"""Cameras and face units together: what of an expression the units can express."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mien.arrays import Array, Bool, Float
+from mien.camera import Camera
+from mien.numeric.rotation import rotation_from_vector
+from mien.reconstruction.dense.projection import UNKNOWNS
+from mien.reconstruction.expression.known_head import KnownHead
+from mien.reconstruction.observations import Sightings, measure_misses
+
+UNIT_SD = 0.35
+"""How far a unit's weight lies off what the detector's scores say."""
+MOST = 1.2
+"""A unit goes no farther than this."""
+_ROUNDS = 12
+_SETTLED = 1e-4
+
+
+@dataclass(frozen=True)
+class Explained:
+    """What explains the photos of an expression.
+
+    Attributes:
+        cameras: one a photo. weights: (52,) of the face units, 0 to 1.2.
+    """
+
+    cameras: tuple[Camera, ...]
+    weights: Float[Array, " 52"]
+
+    def vertices(self, known: KnownHead) -> Float[Array, "v 3"]:
+        """(V, 3) mm: the head as the units have it."""
+        moved: Array = known.vertices + np.tensordot(self.weights, known.units, axes=1)
+        return moved
+
+
+def explain(
+    sightings: Sightings,
+    start: Explained,
+    expected: Float[Array, " 52"],
+    focal_sd: Float[Array, " k"],
+    known: KnownHead,
+    *,
+    free: Bool[Array, " 52"],
+) -> Explained:
+    """Cameras and unit weights of highest posterior.
+
+    Minimizes the Cauchy-weighted squared distances of the sightings, in units of their error, plus
+    the squared deviations of weights from `expected` and of log focal lengths from the start's;
+    weights stay within 0 and 1.2.
+
+    Args:
+        expected: (52,) what the detector says of the units.
+        focal_sd: (K,) standard deviation of log focal lengths.
+        free: (52,) the units to solve for; the others stay at 0.
+    """
+    from scipy.optimize import lsq_linear
+
+    units = np.flatnonzero(free)
+    basis = sightings.on(known.units[units]) if len(units) else np.zeros((0, 0, 3))
+    rest = sightings.on(known.vertices) + sightings.beside
+    focal = np.log([camera.focal_px for camera in start.cameras])
+    state = start
+    for _ in range(_ROUNDS):
+        matrix, gradient = _normal_equations(sightings, state, rest, basis, units)
+        count = len(state.cameras)
+        lens = UNKNOWNS * np.arange(count) + UNKNOWNS - 1
+        now = np.log([camera.focal_px for camera in state.cameras])
+        matrix[lens, lens] += 1 / focal_sd**2
+        gradient[lens] += (now - focal) / focal_sd**2
+        own = UNKNOWNS * count + np.arange(len(units))
+        matrix[own, own] += 1 / UNIT_SD**2
+        gradient[own] += (state.weights[units] - expected[units]) / UNIT_SD**2
+        matrix[np.diag_indices_from(matrix)] *= 1 + 1e-6
+        root = np.linalg.cholesky(matrix).T
+        low, high = np.full(len(matrix), -np.inf), np.full(len(matrix), np.inf)
+        low[own], high[own] = -state.weights[units], MOST - state.weights[units]
+        high[own] = np.maximum(high[own], low[own] + 1e-9)
+        step = lsq_linear(root, -np.linalg.solve(root.T, gradient), bounds=(low, high)).x
+        state = _moved(state, step, units)
+        if np.abs(step).max() < _SETTLED:
+            break
+    return state
+
+
+def _normal_equations(
+    sightings: Sightings,
+    state: Explained,
+    rest: Float[Array, "m 3"],
+    basis: Float[Array, "u m 3"],
+    units: Array,
+) -> tuple[Array, Array]:
+    """J^T W J and J^T W r over all cameras' unknowns and the weights."""
+    photo, count = sightings.photo, len(state.cameras)
+    places = rest + np.tensordot(state.weights[units], basis, axes=1) if len(units) else rest
+    misses = measure_misses(sightings, places, state.cameras)
+    jacobian = np.zeros((len(photo), 2, UNKNOWNS * count + len(units)))
+    rows = np.arange(len(photo))[:, None]
+    columns = UNKNOWNS * photo[:, None] + np.arange(UNKNOWNS)
+    jacobian[rows, :, columns] = np.swapaxes(misses.projection.by_camera(), 1, 2)
+    if len(units):
+        jacobian[:, :, UNKNOWNS * count :] = np.einsum(
+            "mij,umj->miu", misses.projection.by_place, basis
+        )
+    flat = jacobian.reshape(-1, jacobian.shape[2])
+    weighted = flat * np.repeat(misses.weights, 2)[:, None]
+    return weighted.T @ flat, weighted.T @ misses.residuals.ravel()
+
+
+def _moved(state: Explained, step: Array, units: Array) -> Explained:
+    count = len(state.cameras)
+    cameras = []
+    for camera, move in zip(
+        state.cameras, step[: UNKNOWNS * count].reshape(count, UNKNOWNS), strict=True
+    ):
+        turned = rotation_from_vector(move[:3]) @ camera.R_cam_head
+        x, y, z = camera.t_cam_head
+        moved = np.array([x + move[3], y + move[4], z * np.exp(np.clip(move[5], -0.5, 0.5))])
+        focal = camera.focal_px * float(np.exp(np.clip(move[6], -0.5, 0.5)))
+        cameras.append(replace(camera, R_cam_head=turned, t_cam_head=moved, focal_px=focal))
+    weights = state.weights.copy()
+    weights[units] = np.clip(weights[units] + step[UNKNOWNS * count :], 0, MOST)
+    return Explained(tuple(cameras), weights)

@@ -1,0 +1,187 @@
+"""Photos of one expression to cameras and a shape: the whole of P02 sec. 5.1, and past it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.assets.generic import GenericHead
+from mien.camera import Camera
+from mien.capture.faces.detector import NO_FACE
+from mien.capture.source import View
+from mien.errors import EstimationError
+from mien.reconstruction.features import gather_features
+from mien.reconstruction.landmark_fit import FitOptions, Solution, residuals_of, solve_by_features
+from mien.reconstruction.outliers import (
+    HOPELESS_SIGMAS,
+    PhotoFit,
+    depth_notes,
+    find_misfit,
+    judge_marks,
+    name_notes,
+    view_spread,
+)
+from mien.reconstruction.registration import register_solution
+from mien.reconstruction.shape.deformation import eye_centers
+from mien.reconstruction.shape.feature_guide import guide_features
+
+__all__ = ["Fit", "FitOptions", "fit_views"]
+
+ONE_SIDE_DEG = 10.0
+"""Photos from within so much, as landmarks alone have it, tell no depth."""
+ONE_SIDE = "it looks from the same side as {}, and would only blur what that one shows"
+NEARER_TELLS = 1.3
+"""Unless one is taken from so many times the distance of another: perspective tells it, too."""
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted shape.
+
+    Attributes:
+        vertices: (V, 3) mm, head space.
+        photos: by photo name, those that fit.
+        left_out: why, by photo name, the others did not.
+        uncertainty_mm: (V,).
+        notes: what a user should know about this fit.
+    """
+
+    vertices: Float[Array, "v 3"]
+    photos: dict[str, PhotoFit]
+    left_out: dict[str, str]
+    uncertainty_mm: Float[Array, " v"]
+    notes: tuple[str, ...] = ()
+
+
+def fit_views(
+    views: Sequence[View],
+    generic: GenericHead,
+    options: FitOptions,
+    *,
+    progress: Progress | None = None,
+) -> Fit:
+    """Cameras and shape of one expression.
+
+    Args:
+        progress: told the steps of the registration done and their total.
+    Raises: EstimationError: no photo fits.
+    Source: P02 sec. 5.1; the registration of several photos is ours (docs/registration.md).
+    """
+    from threadpoolctl import threadpool_limits
+
+    # The matrices are small: BLAS threads that wait for each other cost several times the work.
+    with threadpool_limits(1, user_api="blas"):
+        return _fit_views(views, generic, options, progress)
+
+
+def _fit_views(
+    views: Sequence[View], generic: GenericHead, options: FitOptions, progress: Progress | None
+) -> Fit:
+    marked = [view for view in views if view.marked]
+    faceless = [view for view in views if not view.marked]
+    if not marked:
+        names = ", ".join(view.photo.name for view in views)
+        raise EstimationError(f"{names}: {NO_FACE}")
+    left_out: dict[str, str] = {}
+    while True:
+        solution = solve_by_features(marked, gather_features(marked, generic), generic, options)
+        left_out |= solution.problems
+        misfit = _misfit(solution, generic, options)
+        if misfit is None:
+            break
+        worst, why = misfit
+        left_out[solution.views[worst].photo.name] = why
+        marked = [view for k, view in enumerate(solution.views) if k != worst]
+    if options.dense and options.adjust:
+        solution = _all_photos(solution, faceless, generic, options, progress)
+        left_out |= solution.problems
+    else:
+        left_out |= {view.photo.name: NO_FACE for view in faceless}
+    if options.adjust:
+        solution = _guided(solution, generic)
+    vertices, cameras = _in_head_space(solution, generic, options)
+    sigma_px = solution.features.sigma_px(solution.cameras)
+    photos = {}
+    for k, (view, camera) in enumerate(zip(solution.views, cameras, strict=True)):
+        marks = judge_marks(solution.features, k, solution.residuals[k], sigma_px[k])
+        matches, rms_px = solution.matches[k] if solution.matches else (0, 0.0)
+        photos[view.photo.name] = PhotoFit(camera, marks, matches, rms_px)
+    notes = (*depth_notes(cameras), *solution.notes, *name_notes(photos))
+    return Fit(vertices, photos, left_out, solution.uncertainty_mm, notes)
+
+
+def _all_photos(
+    solution: Solution,
+    faceless: Sequence[View],
+    generic: GenericHead,
+    options: FitOptions,
+    progress: Progress | None,
+) -> Solution:
+    """The solution by the skin that the photos share; where they look from one side, one's own."""
+    if faceless or len(solution.views) == 1 or not _from_one_side(solution.cameras):
+        return register_solution(solution, faceless, generic, progress)
+    # Depth would be noise. The photo that tells most by itself gives the shape.
+    best = int(np.nansum(1 / solution.features.sigma_mm, axis=1).argmax())
+    view = solution.views[best]
+    alone = solve_by_features([view], gather_features([view], generic), generic, options)
+    problems = {
+        other.photo.name: ONE_SIDE.format(view.photo.name)
+        for other in solution.views
+        if other is not view
+    }
+    return replace(alone, problems=solution.problems | problems)
+
+
+def _from_one_side(cameras: Sequence[Camera]) -> bool:
+    """Whether nothing tells depth: neither another side nor another distance."""
+    distance = np.array([float(camera.t_cam_head[2]) for camera in cameras])
+    near = distance.max() / distance.min() < NEARER_TELLS
+    return bool(near) and view_spread(cameras) < ONE_SIDE_DEG
+
+
+def _guided(solution: Solution, generic: GenericHead) -> Solution:
+    """The solution with eyelids and lips where landmarks show them."""
+    features, cameras = solution.features, solution.cameras
+    vertices = guide_features(
+        solution.vertices, features, cameras, generic, measured=bool(solution.matches)
+    )
+    residuals = residuals_of(features, cameras, vertices)
+    return replace(solution, vertices=vertices, residuals=residuals)
+
+
+def _misfit(
+    solution: Solution, generic: GenericHead, options: FitOptions
+) -> tuple[int, str] | None:
+    """The photo to leave out, if any, and why."""
+    typical = solution.typical_misfits
+    if len(typical) < 2 or typical.min() < HOPELESS_SIGMAS:
+        return find_misfit(typical)
+    # Together they make no head at all: the one to blame makes none by itself either.
+    alone = [
+        solve_by_features(
+            [view], gather_features([view], generic), generic, options
+        ).typical_misfits[0]
+        for view in solution.views
+    ]
+    worst = int(np.argmax(alone))
+    off = f", they lie {alone[worst]:.0f} times their expected error off the nearest"
+    return worst, f"no head has its marks in these places{off if alone[worst] < np.inf else ''}"
+
+
+def _in_head_space(
+    solution: Solution, generic: GenericHead, options: FitOptions
+) -> tuple[Float[Array, "v 3"], tuple[Camera, ...]]:
+    """The same picture with the origin between the eyes and the measured scale."""
+    eyes = eye_centers(generic.mesh.with_vertices(solution.vertices))
+    origin = eyes.mean(axis=0)
+    scale = options.interpupillary_mm / float(np.linalg.norm(eyes[0] - eyes[1]))
+    cameras = tuple(
+        replace(camera, t_cam_head=scale * (camera.t_cam_head + camera.R_cam_head @ origin))
+        for camera in solution.cameras
+    )
+    return scale * (solution.vertices - origin), cameras

@@ -1,0 +1,181 @@
+"""Cameras and shape from marks and landmarks alone: P02 sec. 5.1, and a joint adjustment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Float, Int
+from mien.assets.generic import GenericHead
+from mien.camera import Camera
+from mien.capture.source import View
+from mien.errors import EstimationError
+from mien.reconstruction.bundle.adjustment import Adjustment, FocalPrior, ShapePrior, adjust_bundle
+from mien.reconstruction.features import Features, image_points_for_cameras, rematch_curves
+from mien.reconstruction.outliers import typical_misfits
+from mien.reconstruction.pose.recovery import recover_pose
+from mien.reconstruction.shape.deformation import vertex_uncertainty
+from mien.reconstruction.shape.from_features import shape_from_features
+from mien.reconstruction.triangulation import intersect_rays
+
+FOCAL_PRIOR_DIAGONALS = 1.7
+"""Without EXIF: a focal length between a phone's (0.6 diagonals) and a cropped portrait's (3.5)."""
+FOCAL_PRIOR_DEVIATION = 0.6
+EXIF_DEVIATION = 0.05
+NAMED_SIGMA_MM = 2.0
+"""How far a marked point lies off the identity basis, each axis: what a name means differs between
+faces and between people who mark them (docs/pose-recovery.md)."""
+ATTACHED_SIGMA_MM = 1.5
+"""The same for a landmark: the detector that finds it also attached it to the generic head."""
+NEAREST_MM = 150.0
+"""No photo of a face is taken from nearer to the eyes; a camera there is a solver gone astray."""
+PRIOR_DEVIATION_MM = 2.5
+"""How far the generic head lies from a person's where no photo tells."""
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How a fit is done; the defaults are what works best.
+
+    Attributes:
+        adjust: joint bundle adjustment under the identity prior after P02's five steps; without it,
+            cameras come from the five steps and shape from ray intersection alone, as in P02.
+        dense: register several photos by all the skin that they share; without it, and always for
+            one photo, marks and landmarks alone decide.
+        curves: "epipolar" or "arc-length", how drawn curves become points (P02 sec. 5.1.3).
+        kernel: radial basis of the deformation (numeric.rbf).
+        interpupillary_mm: measured distance between the pupils, which sets the scale.
+        rounds: times that curves and shape are refined.
+    """
+
+    adjust: bool = True
+    dense: bool = True
+    curves: str = "epipolar"
+    kernel: str = "exponential"
+    interpupillary_mm: float = 63.0
+    rounds: int = 2
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Cameras and shape in the frame and scale of the solver."""
+
+    views: Sequence[View]
+    features: Features
+    cameras: tuple[Camera, ...]
+    vertices: Float[Array, "v 3"]
+    residuals: Float[Array, "k n 2"]
+    uncertainty_mm: Float[Array, " v"]
+    problems: dict[str, str]
+    notes: tuple[str, ...] = ()
+    matches: tuple[tuple[int, float], ...] = ()
+
+    @property
+    def typical_misfits(self) -> Float[Array, " k"]:
+        """(K,) how many expected errors each photo's marks lie off, in the median."""
+        typical = typical_misfits(self.residuals, self.features.sigma_px(self.cameras))
+        distance = np.array([camera.t_cam_head[2] for camera in self.cameras])
+        return np.where(distance < NEAREST_MM, np.inf, typical)
+
+
+def solve_by_features(
+    views: Sequence[View], features: Features, generic: GenericHead, options: FitOptions
+) -> Solution:
+    """P02's five steps, then as often as asked for: curves, joint adjustment or rays, shape."""
+    try:
+        start = recover_pose(
+            image_points_for_cameras(features),
+            features.on(generic.mesh.vertices),
+            np.array([view.photo.size for view in views]),
+            weights=1 / features.sigma_mm**2,
+        )
+    except EstimationError as error:
+        names = ", ".join(view.photo.name for view in views)
+        raise EstimationError(f"{names}: {error}") from None
+    problems = {
+        view.photo.name: text for view, text in zip(views, start.problems, strict=True) if text
+    }
+    keep = np.array([not text for text in start.problems])
+    views = [view for view in views if view.photo.name not in problems]
+    cameras = tuple(camera for camera in start.cameras if camera is not None)
+    points = start.points[features.seen[keep].any(axis=0)]
+    features = features.of_photos(keep)
+    vertices = generic.mesh.vertices
+    for _ in range(options.rounds):
+        if options.curves == "epipolar":
+            features = rematch_curves(features, views, cameras, generic)
+        if options.adjust:
+            adjusted = _adjust(views, features, cameras, points, generic)
+            cameras, points, deviation = adjusted.cameras, adjusted.points, adjusted.point_sd_mm
+        else:
+            points, deviation = _intersect(features, cameras, features.on(vertices))
+        vertices = shape_from_features(features, points, cameras, generic, kernel=options.kernel)
+    residuals = residuals_of(features, cameras, vertices)
+    uncertainty = vertex_uncertainty(
+        vertices, features.on(vertices), deviation, prior_mm=PRIOR_DEVIATION_MM
+    )
+    return Solution(views, features, cameras, vertices, residuals, uncertainty, problems)
+
+
+def _adjust(
+    views: Sequence[View],
+    features: Features,
+    cameras: tuple[Camera, ...],
+    points: Float[Array, "n 3"],
+    generic: GenericHead,
+) -> Adjustment:
+    """Cameras and points of highest posterior under the identity prior."""
+    by_hand = features.by_hand.any(axis=0)
+    prior = ShapePrior(
+        mean=features.on(generic.mesh.vertices),
+        components=features.on(generic.identity.components),
+        sigma=np.where(by_hand, NAMED_SIGMA_MM, ATTACHED_SIGMA_MM),
+    )
+    return adjust_bundle(
+        cameras,
+        points,
+        features.image_points,
+        sigma_px=np.where(features.seen, features.sigma_px(cameras), 1.0),
+        loss="cauchy",
+        shape_prior=prior,
+        focal_prior=focal_beliefs(views),
+        focal_group=same_lens(views),
+    )
+
+
+def _intersect(
+    features: Features, cameras: tuple[Camera, ...], places: Float[Array, "n 3"]
+) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
+    """P02 sec. 5.1.3: the features where their rays meet, and how far those miss each other."""
+    weights = 1 / features.sigma_mm**2
+    rays = intersect_rays(cameras, features.image_points, weights=weights, current=places)
+    return rays.points, np.where(rays.solved, rays.residual_mm, PRIOR_DEVIATION_MM)
+
+
+def focal_beliefs(views: Sequence[View]) -> FocalPrior:
+    """EXIF where the photo has it; otherwise anything from a phone to a cropped portrait."""
+    known = [view.photo.focal_prior_px for view in views]
+    diagonals = [float(np.hypot(*view.photo.size)) for view in views]
+    focal = [
+        FOCAL_PRIOR_DIAGONALS * diagonal if exif is None else exif
+        for exif, diagonal in zip(known, diagonals, strict=True)
+    ]
+    deviation = [FOCAL_PRIOR_DEVIATION if exif is None else EXIF_DEVIATION for exif in known]
+    return FocalPrior(np.array(focal), np.array(deviation))
+
+
+def same_lens(views: Sequence[View]) -> Int[Array, " k"]:
+    """(K,) the same number for photos of one lens: the frames of a video."""
+    files = [view.photo.path for view in views]
+    return np.array([files.index(file) for file in files])
+
+
+def residuals_of(
+    features: Features, cameras: Sequence[Camera], vertices: Float[Array, "v 3"]
+) -> Float[Array, "k n 2"]:
+    """(K, N, 2) px: where the features of a head are seen, less where they were found."""
+    projected = np.stack([camera.project(features.on(vertices)) for camera in cameras])
+    residuals: Array = projected - features.image_points
+    return residuals

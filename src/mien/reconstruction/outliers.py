@@ -1,0 +1,146 @@
+"""Which marks and which photos do not fit the head, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.camera import Camera
+from mien.reconstruction.features import Features
+
+DISTRUST_SIGMAS = 5.0
+"""A mark this many times its expected error off the model is distrusted."""
+MISFIT_SIGMAS, MISFIT_RATIO = 4.0, 3.0
+"""A photo is left out when its marks lie, in the median, this many expected errors off, and this
+many times farther than the other photos'."""
+ASKING_SHARE = 0.35
+"""When more of a photo's hand marks are distrusted, their names may be wrong."""
+HOPELESS_SIGMAS = 12.0
+"""When every photo's marks lie this far off, one of them spoils the head for all."""
+MIN_PARALLAX_DEG = 8.0
+
+
+@dataclass(frozen=True)
+class Mark:
+    """One feature in one photo: where it was seen and how far off the model puts it, px."""
+
+    name: str
+    image_point: Float[Array, " 2"]
+    residual_px: Float[Array, " 2"]
+    by_hand: bool
+    verdict: str = ""
+
+    @property
+    def distance_px(self) -> float:
+        """Length of the residual."""
+        return float(np.hypot(*self.residual_px))
+
+
+@dataclass(frozen=True)
+class PhotoFit:
+    """The camera of one photo and how well what it shows agrees with the fitted head.
+
+    Attributes:
+        marks: hand-made marks and landmarks.
+        matches: places of the skin that the other photos show, too; they outweigh landmarks.
+        matches_rms_px: root mean square of their residuals.
+    """
+
+    camera: Camera
+    marks: tuple[Mark, ...]
+    matches: int = 0
+    matches_rms_px: float = 0.0
+
+    @property
+    def trusted(self) -> tuple[Mark, ...]:
+        """The marks without a verdict."""
+        return tuple(mark for mark in self.marks if not mark.verdict)
+
+    @property
+    def points_used(self) -> int:
+        """How many points the camera and the shape rest on."""
+        return self.matches + len(self._leading)
+
+    @property
+    def _leading(self) -> tuple[Mark, ...]:
+        """Trusted marks that count beside the matches: where there are any, those made by hand."""
+        return tuple(mark for mark in self.trusted if mark.by_hand or not self.matches)
+
+    @property
+    def rms_px(self) -> float:
+        """Root mean square distance over the points used."""
+        total = self.matches * self.matches_rms_px**2
+        total += sum(mark.distance_px**2 for mark in self._leading)
+        return float(np.sqrt(total / self.points_used)) if self.points_used else 0.0
+
+
+def judge_marks(
+    features: Features, k: int, residuals: Float[Array, "n 2"], sigma_px: Float[Array, " n"]
+) -> tuple[Mark, ...]:
+    """Every mark of photo k with its residual; far off its expected error it gets a verdict."""
+    marks = []
+    for n in np.flatnonzero(features.seen[k]):
+        off = float(np.hypot(*residuals[n])) / sigma_px[n]
+        verdict = f"{off:.0f} times its expected error off" if off > DISTRUST_SIGMAS else ""
+        by_hand = bool(features.by_hand[k, n])
+        place = features.image_points[k, n]
+        marks.append(Mark(features.names[n], place, residuals[n], by_hand, verdict))
+    return tuple(marks)
+
+
+def typical_misfits(
+    residuals: Float[Array, "k n 2"], sigma_px: Float[Array, "k n"]
+) -> Float[Array, " k"]:
+    """(K,) how many expected errors each photo's marks lie off, in the median."""
+    off = np.linalg.norm(residuals, axis=2) / sigma_px
+    return np.array([np.median(row[np.isfinite(row)]) for row in off])
+
+
+def find_misfit(typical: Float[Array, " k"]) -> tuple[int, str] | None:
+    """The photo that fits worst and why, if it fits so badly that it shows something else."""
+    if len(typical) < 2:
+        return None
+    worst = int(typical.argmax())
+    others = float(np.median(np.delete(typical, worst)))
+    if typical[worst] < max(MISFIT_SIGMAS, MISFIT_RATIO * others):
+        return None
+    return worst, (
+        f"its marks lie {typical[worst]:.1f} times their expected error off the head that the "
+        f"other photos show ({others:.1f} times there)"
+    )
+
+
+def depth_notes(cameras: Sequence[Camera]) -> tuple[str, ...]:
+    """What the user should know when the viewpoints do not tell depth."""
+    if len(cameras) == 1:
+        return ("one photo: depth comes from the prior of faces, not from this person",)
+    spread = view_spread(cameras)
+    if spread < MIN_PARALLAX_DEG:
+        return (
+            f"all photos come from within {spread:.0f} degrees: depth comes from the prior of "
+            f"faces, not from this person ({MIN_PARALLAX_DEG:.0f} degrees or more would show it)",
+        )
+    return ()
+
+
+def view_spread(cameras: Sequence[Camera]) -> float:
+    """Degrees between the two directions farthest apart from which cameras look at the head."""
+    axes = np.stack([camera.center / np.linalg.norm(camera.center) for camera in cameras])
+    return float(np.degrees(np.arccos(np.clip(axes @ axes.T, -1, 1)).max()))
+
+
+def name_notes(photos: Mapping[str, PhotoFit]) -> tuple[str, ...]:
+    """Photos whose hand marks fit so badly that their names may be wrong."""
+    notes = []
+    for photo, fit in photos.items():
+        by_hand = [mark for mark in fit.marks if mark.by_hand]
+        distrusted = [mark for mark in by_hand if mark.verdict]
+        if len(distrusted) > ASKING_SHARE * len(by_hand):
+            notes.append(
+                f"{photo}: {len(distrusted)} of its {len(by_hand)} hand-made marks are distrusted: "
+                "are their names right, and left and right the subject's?"
+            )
+    return tuple(notes)

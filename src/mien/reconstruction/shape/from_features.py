@@ -1,0 +1,76 @@
+"""A head's shape from its feature points, the cameras fixed (P02 sec. 5.1.2 and 5.1.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mien.arrays import Array, Float
+from mien.assets.generic import GenericHead
+from mien.camera import Camera
+from mien.reconstruction.features import Features
+from mien.reconstruction.shape.deformation import deform_head
+from mien.reconstruction.triangulation import intersect_rays
+
+IDENTITY_SIGMA_MM = 3.0
+"""How far a feature lies off the identity basis, its meaning on another face included."""
+SEEN_ONCE_SIGMA_MM = 1.0
+"""How well at best a feature that one photo shows tells the surface: its depth is a guess."""
+
+
+def shape_from_features(
+    features: Features,
+    points: Float[Array, "n 3"],
+    cameras: Sequence[Camera],
+    generic: GenericHead,
+    *,
+    kernel: str = "exponential",
+    rounds: int = 2,
+) -> Float[Array, "v 3"]:
+    """(V, 3) mm: the generic head as this person, then moved to the features.
+
+    Features seen in several photos come first, since they carry depth. Those seen once are
+    then put on their ray next to where the head has come to lie, as often as `rounds` says.
+
+    Args:
+        points: (N, 3) mm, where the features seen twice lie.
+    Source: P02 sec. 5.1.3, repeated; the identity basis beneath is ours.
+    """
+    twice = features.seen.sum(axis=0) > 1
+    deviation = features.sigma_mm.min(axis=0)
+    coefficients = estimate_identity(features, points, generic)
+    vertices = generic.mesh.vertices + generic.identity.offsets(coefficients)
+    if twice.any():
+        places = features.on(vertices)[twice]
+        vertices = deform_head(
+            vertices, places, points[twice], generic, deviation_mm=deviation[twice], kernel=kernel
+        )
+    if twice.all():
+        return vertices
+    deviation = np.where(twice, deviation, np.maximum(deviation, SEEN_ONCE_SIGMA_MM))
+    for _ in range(rounds):
+        places = features.on(vertices)
+        on_rays = intersect_rays(cameras, features.image_points, current=places).points
+        goals = np.where(twice[:, None], points, on_rays)
+        vertices = deform_head(
+            vertices, places, goals, generic, deviation_mm=deviation, kernel=kernel
+        )
+    return vertices
+
+
+def estimate_identity(
+    features: Features, points: Float[Array, "n 3"], generic: GenericHead
+) -> Float[Array, " k"]:
+    """(K,) coefficients of highest posterior given where the features lie.
+
+    Ridge regression: coefficients have deviation 1, features IDENTITY_SIGMA_MM.
+    """
+    components = features.on(generic.identity.components).reshape(
+        len(generic.identity.components), -1
+    )
+    offsets = (points - features.on(generic.mesh.vertices)).ravel()
+    precision = IDENTITY_SIGMA_MM**-2
+    normal = precision * components @ components.T + np.eye(len(components))
+    coefficients: Array = np.linalg.solve(normal, precision * components @ offsets)
+    return coefficients

@@ -1,0 +1,87 @@
+"""Which part of a video's frames is worth showing, and how large."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mien.arrays import Array, Int, UInt8
+from mien.camera import Camera
+from mien.head import Head
+from mien.track.state import Track, TrackState
+
+_MARGIN = 0.1
+"""Around the head's way through the frames, as a share of its size."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """The part of a video's frames that is shown, and how large.
+
+    Attributes:
+        left, top, right, bottom: px of the video. factor: size of a shown pixel's side over a
+            video's.
+    """
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+    factor: float
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height as shown; even, as videos want them."""
+        sides = (self.right - self.left, self.bottom - self.top)
+        width, height = (max(2, 2 * round(side * self.factor / 2)) for side in sides)
+        return width, height
+
+    def camera(self, track: Track, state: TrackState) -> Camera:
+        """The camera that sees the head as the window does."""
+        whole = track.camera(state).resized(self.factor)
+        width, height = self.size
+        corner = self.factor * np.array([self.left, self.top])
+        return replace(whole, width=width, height=height, principal_px=whole.principal - corner)
+
+    def cut(self, pixels: UInt8[Array, "h w 3"], track: Track) -> UInt8[Array, "h w 3"]:
+        """What the window shows of a frame, which may have been reduced in size."""
+        import cv2
+
+        scale = pixels.shape[1] / track.width
+        top, bottom, left, right = (
+            round(side * scale) for side in (self.top, self.bottom, self.left, self.right)
+        )
+        part = pixels[top:bottom, left:right]
+        smaller = self.size[0] < part.shape[1]
+        kind = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
+        shown: Array = cv2.resize(part, self.size, interpolation=kind)
+        return shown
+
+
+def window_of(track: Track, head: Head, limits: tuple[int, int]) -> Window:
+    """The whole frame where there is room for it; otherwise where the head goes.
+
+    Args:
+        limits: width and height that there is room for, px.
+    """
+    whole = np.array([[0, 0], [track.width, track.height]])
+    box = whole if (whole[1] <= limits).all() else _way(track, head, whole)
+    factor = float(min(1.0, (limits / (box[1] - box[0])).min()))
+    (left, top), (right, bottom) = box.tolist()
+    return Window(left, top, right, bottom, factor)
+
+
+def _way(track: Track, head: Head, whole: Int[Array, "2 2"]) -> Int[Array, "2 2"]:
+    """Corners of what the head covers in all frames together."""
+    low, high = head.mesh.vertices.min(axis=0), head.mesh.vertices.max(axis=0)
+    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+    cameras = [track.camera(found.state) for found in track.frames if found.state is not None]
+    seen = [item.project(corners) for item in cameras if (item.to_camera(corners)[:, 2] > 1).all()]
+    if not seen:
+        return whole
+    points = np.concatenate(seen)
+    margin = _MARGIN * np.median([np.ptp(item, axis=0).max() for item in seen])
+    box = np.rint([points.min(axis=0) - margin, points.max(axis=0) + margin]).astype(np.int64)
+    box = np.clip(box, 0, whole[1])
+    return box if (box[1] > box[0]).all() else whole

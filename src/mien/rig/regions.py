@@ -1,0 +1,125 @@
+"""The regions of the face that are controlled independently (P02 sec. 6.1.1, fig. 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from mien.arrays import Array, Float, check_array
+from mien.assets.generic import GenericHead
+from mien.errors import InputError
+from mien.rig.state import FACE
+
+AROUND: Mapping[str, tuple[str, ...]] = {
+    FACE: (),
+    "mouth": (FACE,),
+    "eyes": (FACE,),
+    "forehead": (FACE,),
+    "left_mouth": ("mouth", FACE),
+    "right_mouth": ("mouth", FACE),
+    "left_eye": ("eyes", FACE),
+    "right_eye": ("eyes", FACE),
+    "left_forehead": ("forehead", FACE),
+    "right_forehead": ("forehead", FACE),
+}
+"""All regions by name, and those around each from the nearest on."""
+
+MASKS = ("left_mouth", "right_mouth", "left_eye", "right_eye", "left_forehead", "right_forehead")
+"""The regions that have masks; the others are made of them. The rest of the head is the face's."""
+
+_MIDLINE_MM = 12.0
+"""Width over which left gives way to right."""
+_RAMP = (0.3, 0.8)
+"""Between upper lid (0) and brow (1): where the eyes' region gives way to the forehead's."""
+_AT_LIDS = 0.8
+"""Of the generic mask of the eyes: from there on, lids and their margins too, all is theirs."""
+_PARTS = {
+    "left_eyeball": "eyes",
+    "right_eyeball": "eyes",
+    "lashes": "eyes",
+    "upper_teeth": "mouth",
+    "lower_teeth": "mouth",
+    "tongue": "mouth",
+}
+
+
+def default_masks(generic: GenericHead) -> dict[str, Float[Array, " v"]]:
+    """(V,) in [0, 1] by name of MASKS: a partition of the face with soft borders.
+
+    What lies behind the lips, the nostrils and the lids goes with them, as do teeth and tongue,
+    lashes and eyes. The border between eyes and forehead runs below the brows: across them, two
+    expressions would show two brows.
+    """
+    regions, left = generic.regions, _left_share(generic.mesh.vertices[:, 0])
+    mouth = np.maximum(regions["mouth"], regions["mouth_cavity"])
+    socket = regions["eye_socket"] * (1 - regions["mouth_cavity"])
+    eyes = np.maximum(np.minimum(regions["eyes"] / _AT_LIDS, 1.0), socket)
+    mouth = np.minimum(mouth, 1 - eyes)
+    above = _above_lids(generic) * (1 - socket)
+    forehead = regions["forehead"] + eyes * above
+    eyes = eyes * (1 - above)
+    whole = {"mouth": mouth, "eyes": eyes, "forehead": forehead}
+    for part, region in _PARTS.items():
+        inside = np.unique(generic.mesh.triangles[generic.mesh.triangles_of(part)])
+        for name, mask in whole.items():
+            mask[inside] = name == region
+    total = np.maximum(sum(whole.values()), 1.0)
+    masks: dict[str, Float[Array, " v"]] = {}
+    for name, mask in whole.items():
+        half = "eye" if name == "eyes" else name
+        masks[f"left_{half}"] = left * mask / total
+        masks[f"right_{half}"] = (1 - left) * mask / total
+    return {name: masks[name] for name in MASKS}
+
+
+def _above_lids(generic: GenericHead) -> Float[Array, " v"]:
+    """(V,) from 0 at the upper lids to 1 at the lower edge of the brows and above."""
+    vertices = generic.mesh.vertices
+    above = np.zeros(len(vertices))
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        lid, brow = (
+            vertices[list(generic.polylines[f"{side}_{line}"])]
+            for line in ("upper_eyelid", "eyebrow_lower")
+        )
+        mine = sign * vertices[:, 0] >= 0
+        heights = [
+            np.interp(sign * vertices[:, 0], *_rising(sign * line[:, 0], line[:, 1]))
+            for line in (lid, brow)
+        ]
+        t = (vertices[:, 1] - heights[0]) / np.maximum(heights[1] - heights[0], 1.0)
+        t = np.clip((t - _RAMP[0]) / (_RAMP[1] - _RAMP[0]), 0, 1)
+        above[mine] = (t * t * (3 - 2 * t))[mine]
+    return above
+
+
+def _rising(x: Float[Array, " n"], y: Float[Array, " n"]) -> tuple[Array, Array]:
+    order = np.argsort(x)
+    return x[order], y[order]
+
+
+def check_masks(masks: Mapping[str, object], vertices: int) -> dict[str, Float[Array, " v"]]:
+    """(V,) masks by name, in the order of MASKS, scaled down where they sum to more than 1.
+
+    A region that is left out has an empty mask: the face's weights hold there.
+    Raises: InputError: an unknown name, another shape, values outside [0, 1].
+    """
+    for name in masks:
+        if name not in MASKS:
+            raise InputError("regions", f"names of {', '.join(MASKS)}", name)
+    checked = {}
+    for name in MASKS:
+        mask = check_array(f"region {name}", masks.get(name, np.zeros(vertices)), (vertices,))
+        if mask.min(initial=0) < 0 or mask.max(initial=0) > 1:
+            found = f"{mask.min():g} to {mask.max():g}"
+            raise InputError(f"region {name}", "values from 0 to 1", found)
+        checked[name] = mask
+    total = np.maximum(np.sum(list(checked.values()), axis=0), 1.0)
+    return {name: mask / total for name, mask in checked.items()}
+
+
+def _left_share(x: Float[Array, " v"]) -> Float[Array, " v"]:
+    """(V,) smoothly from 0 on the subject's right to 1 on the left."""
+    t = np.clip(x / _MIDLINE_MM + 0.5, 0, 1)
+    share: Array = t * t * (3 - 2 * t)
+    return share

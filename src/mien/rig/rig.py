@@ -1,0 +1,286 @@
+"""A head that can be moved: photographed expressions, face units and gaze to one posed face."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from mien.arrays import Array, Float, Int, UInt8, check_array
+from mien.assets.generic import GenericHead, load_generic_head
+from mien.errors import InputError
+from mien.head import NEUTRAL, Head
+from mien.limits import UNIT_RANGE
+from mien.rig.basis import WEIGHT_RANGE, check_weights, outside_hull
+from mien.rig.contacts.contacts import Mechanics
+from mien.rig.followers import part_vertices
+from mien.rig.regions import AROUND, MASKS, check_masks, default_masks
+from mien.rig.shading import Openings, brightness_at
+from mien.rig.sparse_offsets import add_mixture
+from mien.rig.state import FACE, FaceState, PosedFace
+from mien.rig.unit_decomposition import Explanations
+
+REGIONS = (*MASKS, FACE)
+"""Those that have weights of their own in the end; the face's hold in the rest of the head."""
+
+
+class Rig:
+    """Poses the face of one head; everything that does not change is prepared once.
+
+    Attributes:
+        names: photographed expressions, neutral first: what the weights' columns stand for.
+        textures: (h, w, 3) one for each name, of one size.
+        offsets: (K, V, 3) mm from neutral to each of them, eyeballs where neutral has them.
+    Raises: InputError: a head of another topology than the generic one's, no texture for neutral,
+        textures of different sizes.
+    Source: P02 sec. 6.1.1: consensus geometry, weights by region. Units, contacts and what of an
+        expression comes along with the units that explain it are ours (docs/expressions.md).
+    """
+
+    def __init__(self, head: Head) -> None:
+        generic = load_generic_head()
+        if head.mesh.vertices.shape != generic.mesh.vertices.shape:
+            expected = f"the generic head's {len(generic.mesh.vertices)} vertices"
+            raise InputError("head", expected, len(head.mesh.vertices))
+        self.names = (NEUTRAL, *(name for name in head.expressions if name != NEUTRAL))
+        self.textures = _textures(head, self.names)
+        self.unit_names = head.unit_names
+        self._neutral = np.asarray(head.mesh.vertices, np.float64)
+        units = np.asarray(head.units, np.float64)
+        masks = check_masks(head.regions or default_masks(generic), len(self._neutral))
+        by_mask = np.stack([masks[name] for name in MASKS], axis=1)
+        self._shares = np.column_stack([by_mask, 1 - by_mask.sum(axis=1)])
+        expressions = [head.expressions[name] for name in self.names]
+        self._gaze = np.stack([item.gaze for item in expressions])
+        self._mechanics = Mechanics.of(generic, self._neutral, units)
+        self.offsets = np.stack(
+            [self._still_eyes(item.vertices) - self._neutral for item in expressions]
+        )
+        self._explained = Explanations.of(
+            np.array([[item.units.get(n, 0.0) for n in self.unit_names] for item in expressions]),
+            units,
+            self.offsets,
+            by_mask,
+        )
+        self._openings = Openings.of(generic, self._neutral)
+        self._shading = head.shading
+        self._photographed = np.stack([item.vertices for item in expressions])
+        openings = np.stack([self._openings.measure(item) for item in self._photographed])
+        self._photographed_light = brightness_at(openings, self._shading)
+        self._shaded = _shaded_parts(generic)
+        # Where eyes look in a photograph has nothing to do with the units that it shows.
+        self._skin_shares = self._shares.copy()
+        for eyeball in self._mechanics.look.eyeballs:
+            self._skin_shares[eyeball.vertices] = 0
+
+    def evaluate(self, state: FaceState, *, contacts: bool = True) -> PosedFace:
+        """The face in this state.
+
+        One expression at weight 1 is that expression exactly, as photographed.
+
+        Args:
+            contacts: whether lids ride on the eyes and lips do not pass through each other.
+        Raises: InputError: an unknown region, expression or unit; weights outside [-0.5, 1.5].
+        """
+        gaze = np.array([state.gaze.yaw, state.gaze.pitch])
+        by_region = self._region_weights(state.expressions)
+        return self.posed(by_region, self._unit_weights(state.units), gaze, contacts=contacts)
+
+    def posed(
+        self,
+        by_region: Float[Array, "r k"],
+        units: Float[Array, " u"],
+        gaze: Float[Array, " 2"],
+        *,
+        contacts: bool = True,
+    ) -> PosedFace:
+        """What evaluate makes of a state, from its numbers; they are not checked.
+
+        Args:
+            by_region: weights of the expressions in each of REGIONS.
+            units: weights. gaze: yaw and pitch, radians.
+        """
+        weights = self._shares @ by_region
+        moved = bool(units.any() or gaze.any())
+        if not moved and _one_expression(by_region):
+            return self._as_photographed(weights)
+        vertices = self._mixed(weights)
+        driven = self._explained.driven(units) * np.clip(by_region[:, :1], 0, 1)
+        if driven.any():
+            along = self._skin_shares @ np.column_stack([-driven.sum(axis=1), driven])
+            add_mixture(along[:, 1:], self._explained.left_over[1:], vertices)
+            weights += along
+        vertices = self._mechanics.applied(vertices, units, gaze, contacts=contacts)
+        return PosedFace(vertices, weights, self._brightness(vertices, weights))
+
+    def mixed(
+        self,
+        weights: Float[Array, "v k"],
+        offsets: Float[Array, "v 3"] | None = None,
+        *,
+        turn: Float[Array, "2 2"] | None = None,
+        contacts: bool = True,
+    ) -> PosedFace:
+        """The face whose every vertex mixes the photographed expressions by weights of its own.
+
+        One expression at weight 1 everywhere is that expression exactly, as photographed.
+
+        Args:
+            weights: (V, K) that sum to 1; alike within an eyeball.
+            offsets: (V, 3) mm, how the mixed face moves on.
+            turn: radians, yaw and pitch by which the left and the right eye turn on.
+            contacts: as for evaluate.
+        Raises: InputError: shape, not finite.
+        """
+        shape = (len(self._neutral), len(self.names))
+        weights = check_array("weights", weights, shape)
+        if offsets is None and turn is None and _one_expression(weights):
+            return self._as_photographed(weights)
+        vertices = self._mixed(weights)
+        if turn is not None:
+            self._mechanics.look.turn(vertices, check_array("turn", turn, (2, 2)))
+        if offsets is not None:
+            vertices += check_array("offsets", offsets, vertices.shape)
+        still = np.zeros(len(self.unit_names))
+        vertices = self._mechanics.applied(vertices, still, contacts=contacts)
+        return PosedFace(vertices, weights, self._brightness(vertices, weights))
+
+    def mask(self, region: str) -> Float[Array, " v"]:
+        """(V,) in [0, 1]: how far each vertex obeys this region's weights.
+
+        Raises: InputError: an unknown region.
+        """
+        _check_known("region", region, AROUND)
+        inside = [region in (name, *AROUND[name]) for name in MASKS]
+        mask: Array = self._shares[:, [*inside, region == FACE]].sum(axis=1)
+        return mask
+
+    def hull_notes(self, state: FaceState) -> tuple[str, ...]:
+        """What a state asks for beyond the expressions that were photographed, by its regions.
+
+        Raises: InputError: as evaluate.
+        """
+        self._region_weights(state.expressions)
+        self._unit_weights(state.units)
+        weights = {region: self._weights(given) for region, given in state.expressions.items()}
+        notes = {region: outside_hull(row, self.names) for region, row in weights.items()}
+        return tuple(f"{region}: {note}" for region, note in notes.items() if note)
+
+    def _region_weights(
+        self, expressions: Mapping[str, Mapping[str, float]]
+    ) -> Float[Array, "r k"]:
+        """(R, K) weights in each of REGIONS."""
+        rows = region_rows(tuple(expressions))
+        own = [self._weights({}), *(self._weights(given) for given in expressions.values())]
+        return np.array(own)[rows]
+
+    def _weights(self, given: Mapping[str, float]) -> Float[Array, " k"]:
+        weights = np.zeros(len(self.names))
+        for name, weight in given.items():
+            _check_known("expression", name, self.names)
+            weights[self.names.index(name)] = weight
+        if NEUTRAL not in given:
+            weights[0] = 1 - weights.sum()
+        low, high = WEIGHT_RANGE
+        for name in (*given, NEUTRAL):
+            weight = weights[self.names.index(name)]
+            if not low - 1e-6 <= weight <= high + 1e-6:
+                raise InputError(f"weight of {name}", f"{low} to {high}", f"{weight:g}")
+        return check_weights(weights)
+
+    def _unit_weights(self, given: Mapping[str, float]) -> Float[Array, " u"]:
+        weights = np.zeros(len(self.unit_names))
+        for name, weight in given.items():
+            _check_known("unit", name, self.unit_names)
+            low, high = UNIT_RANGE
+            if not low - 1e-6 <= weight <= high + 1e-6:
+                percent = "; weights in percent?" if high < abs(weight) <= 100 else ""
+                raise InputError(f"unit {name}", f"{low} to {high}", f"{weight:g}{percent}")
+            weights[self.unit_names.index(name)] = weight
+        return weights
+
+    def _still_eyes(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
+        """The expression with its eyeballs as in neutral: they are turned, not mixed."""
+        still = np.array(vertices, np.float64)
+        for eyeball in self._mechanics.look.eyeballs:
+            still[eyeball.vertices] = self._neutral[eyeball.vertices]
+        return still
+
+    def _as_photographed(self, weights: Float[Array, "v k"]) -> PosedFace:
+        """The expression that has weight 1 everywhere."""
+        vertices = self._photographed[int(weights[0].argmax())]
+        return PosedFace(vertices, weights, self._brightness(vertices, weights))
+
+    def _mixed(self, weights: Float[Array, "v k"]) -> Float[Array, "v 3"]:
+        vertices = self._neutral.copy()
+        add_mixture(weights[:, 1:], self.offsets[1:], vertices)
+        self._look_as_photographed(vertices, weights)
+        return vertices
+
+    def _look_as_photographed(
+        self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
+    ) -> None:
+        """Turns the eyes in place by the mean of where they look in the photographs."""
+        look = self._mechanics.look
+        balls = [eyeball.vertices[0] for eyeball in look.eyeballs]
+        look.turn(vertices, np.einsum("sk,ksa->sa", weights[balls], self._gaze))
+
+    def _brightness(
+        self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
+    ) -> Float[Array, " v"]:
+        """P02 sec. 5.2.4, over the shadow that is in the mixed textures already."""
+        now = brightness_at(self._openings.measure(vertices), self._shading)
+        brightness = np.ones(len(vertices))
+        for column, part in enumerate(self._shaded):
+            there = weights[part[0]] @ self._photographed_light[:, column]
+            brightness[part] = now[column] / max(float(there), 0.1)
+        return brightness
+
+
+def region_rows(regions: Sequence[str]) -> Int[Array, " r"]:
+    """(R,) which of these regions each of REGIONS obeys, counted from 1; 0 for none.
+
+    Raises: InputError: an unknown region.
+    """
+    for region in regions:
+        _check_known("region", region, AROUND)
+    nearest = (
+        next((name for name in (own, *AROUND[own]) if name in regions), None) for own in REGIONS
+    )
+    return np.array([0 if name is None else 1 + regions.index(name) for name in nearest])
+
+
+def _textures(head: Head, names: Iterable[str]) -> tuple[UInt8[Array, "h w 3"], ...]:
+    """One for each expression; neutral's for one that has none."""
+    own = {name: head.textures.get(head.expressions[name].texture) for name in names}
+    neutral = own[NEUTRAL]
+    if neutral is None:
+        raise InputError("head", "a texture of neutral", ", ".join(head.textures) or "none")
+    for name, texture in own.items():
+        if texture is not None and texture.shape != neutral.shape:
+            expected = f"{neutral.shape[1]}x{neutral.shape[0]} as neutral's"
+            found = f"{texture.shape[1]}x{texture.shape[0]}"
+            raise InputError(f"texture of {name}", expected, found)
+    return tuple(neutral if texture is None else texture for texture in own.values())
+
+
+def _shaded_parts(generic: GenericHead) -> tuple[Array, Array, Array]:
+    """Vertices of the left eye, the right eye, and of teeth and tongue."""
+    return (
+        part_vertices(generic, "left_eyeball"),
+        part_vertices(generic, "right_eyeball"),
+        part_vertices(generic, "upper_teeth", "lower_teeth", "tongue"),
+    )
+
+
+def _one_expression(weights: Float[Array, "n k"]) -> bool:
+    """Whether the face is one photographed expression, everywhere the same."""
+    return bool(np.count_nonzero(weights[0]) == 1 and (weights == weights[0]).all())
+
+
+def _check_known(what: str, name: str, known: Iterable[str]) -> None:
+    known = tuple(known)
+    if name not in known:
+        close = difflib.get_close_matches(name, known, n=3) or known[:6]
+        raise InputError(what, f"one of the head's, such as {', '.join(close)}", name)

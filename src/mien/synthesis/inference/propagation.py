@@ -1,0 +1,209 @@
+"""The motion of all feature points from that of a few, as Z06 prints it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from mien.arrays import Array, Bool, Float, Int, check_array, check_positive, frozen
+from mien.errors import InputError
+from mien.numeric.pca import Pca, fit_pca
+from mien.synthesis.inference.inferred import LEAST_NOISE, Inferred, check_known, check_statistics
+
+__all__ = ["COMPONENTS", "PointSets", "Propagation", "visiting_order"]
+
+COMPONENTS = (20, 15, 15)
+"""Of the sets of each hierarchy. Z06 keeps 5 to 10 of 30 to 40 images; clips have more to tell."""
+
+PointSets = Sequence[Sequence[Int[Array, " s"]]]
+"""For each hierarchy, from 0 on, its sets of indices of feature points."""
+
+
+class HasPointSets(Protocol):
+    """A layout of feature points: all that is asked of it here."""
+
+    @property
+    def sets(self) -> PointSets: ...
+
+
+class Propagation:
+    """Motion propagation: projections onto what is usual for sets of points, in turn.
+
+    Each iteration puts the known displacements back and projects one set after another onto its
+    principal components, so that what some points do spreads from the sets they are in, across
+    hierarchies, to those that share points with them.
+
+    Args:
+        layout: its point sets, by hierarchy.
+        statistics: (N, n, d) displacements from the neutral face of expressions of the same
+            person, head motion compensated, px in a picture and mm in space; N >= 2.
+        components: how many principal components the sets keep: one number, or one for each
+            hierarchy.
+        trust: what the known points of a set weigh together when it is projected, where all its
+            points at one each weigh 1, and none less than one; 0 is as printed. With more, what
+            was given lasts longer than what was guessed, and fewer iterations are needed.
+        prior: the weight of how usual a displacement is, with what the components leave as the
+            noise; 0 is as printed, 1 the most likely displacement for normally distributed ones.
+            With it, more components do good where they overfit without.
+        threshold: px or mm; the propagation stops when an iteration changes what it makes of the
+            known points by less than this, on the average of two.
+        max_iterations: it stops after so many in any case.
+    Raises: InputError: shapes, NaN, too few statistics, sets of other points, options out of
+        their range.
+    Source: Z06 sec. 10 and 10.1. Left open there: components are about the mean; siblings are
+        visited in the order of the layout; progress is how far the points of T moved since the
+        iteration before. `trust` and `prior` go beyond it.
+    """
+
+    def __init__(
+        self,
+        layout: HasPointSets,
+        statistics: Float[Array, "m n d"],
+        *,
+        components: int | Sequence[int] = COMPONENTS,
+        trust: float = 0.0,
+        prior: float = 0.0,
+        threshold: float = 1e-3,
+        max_iterations: int = 50,
+    ) -> None:
+        statistics = check_statistics(statistics)
+        self._shape = statistics.shape[1:]
+        self._sets = _check_sets(layout.sets, len(statistics[0]))
+        self._trust = _check_not_negative("trust", trust)
+        self._prior = _check_not_negative("prior", prior)
+        self._threshold = check_positive("threshold", threshold)
+        if max_iterations < 1:
+            raise InputError("max_iterations", "a number from 1 on", max_iterations)
+        self._max_iterations = max_iterations
+        self._statistics = _fitted(statistics, self._sets, components)
+
+    def infer(self, known: Int[Array, " k"], displacements: Float[Array, "k d"]) -> Inferred:
+        """The displacements of all points from those of some, in any order.
+
+        Points that no set contains or that no chain of sets joins to the known ones do not move.
+
+        Args:
+            known: indices of points, none twice.
+            displacements: (k, d) from the neutral face, head motion compensated.
+        Raises: InputError: no points, unknown or repeated ones, NaN, none in any set.
+        Source: Z06 sec. 10.1, `MotionPropagation`.
+        """
+        known, given = check_known(known, displacements, *self._shape)
+        projections = self._projections(known)
+        moved = np.zeros(self._shape)
+        errors: list[float] = []
+        progress: list[float] = []
+        while not self._stops(progress):
+            before = moved[known]
+            moved[known] = given
+            for projection in projections:
+                projection.update(moved)
+            errors.append(_distance(moved[known], given))
+            progress.append(_distance(moved[known], before))
+        return Inferred(frozen(moved), frozen(np.array(errors)))
+
+    def _projections(self, known: Int[Array, " k"]) -> list[_Projection]:
+        """One for each set that is reached, in the order in which they are done."""
+        given = np.isin(np.arange(self._shape[0]), known)
+        return [
+            self._projection(self._sets[level][index], self._statistics[level][index], given)
+            for level, index in visiting_order(self._sets, known)
+        ]
+
+    def _projection(
+        self, points: Int[Array, " s"], pca: Pca, given: Bool[Array, " n"]
+    ) -> _Projection:
+        """Least squares over the set, known points weighted, coefficients held by the prior."""
+        known = np.count_nonzero(given[points])
+        weight = max(1.0, self._trust * len(points) / known) if known else 1.0
+        weighted = pca.components * np.repeat(np.where(given[points], weight, 1.0), self._shape[1])
+        # Relative to the noise of known points, so that trust leaves their balance with the prior.
+        noise = weight * max(pca.residual, LEAST_NOISE) ** 2
+        held = np.diag(self._prior * noise / pca.deviations**2)
+        gain = np.linalg.solve(weighted @ pca.components.T + held, weighted)
+        return _Projection(points, pca.mean, gain, pca.components)
+
+    def _stops(self, progress: Sequence[float]) -> bool:
+        """Whether the average progress on two consecutive iterations is too small."""
+        if len(progress) >= self._max_iterations:
+            return True
+        return len(progress) >= 2 and (progress[-2] + progress[-1]) / 2 < self._threshold
+
+
+@dataclass(frozen=True)
+class _Projection:
+    """Proj(dV, F): what is usual for a set of points and nearest to what they do."""
+
+    points: Int[Array, " s"]
+    mean: Float[Array, " d"]
+    gain: Float[Array, "c d"]
+    components: Float[Array, "c d"]
+
+    def update(self, moved: Float[Array, "n d"]) -> None:
+        """Replaces the displacements of the set's points, in place."""
+        weights = self.gain @ (moved[self.points].ravel() - self.mean)
+        usual = self.mean + weights @ self.components
+        moved[self.points] = usual.reshape(len(self.points), -1)
+
+
+def visiting_order(sets: PointSets, known: Int[Array, " k"]) -> list[tuple[int, int]]:
+    """The sets, as (hierarchy, number in it), in the order in which an iteration projects them.
+
+    It depends only on which sets share points, so once is enough for all iterations.
+
+    Raises: InputError: no set contains a known point.
+    Source: Z06 sec. 10.1, `MotionPropagationFeaturePointSet` with its flag hasBeenProcessed.
+    """
+    places = [(level, index) for level, of in enumerate(sets) for index in range(len(of))]
+    members = {place: set(sets[place[0]][place[1]].tolist()) for place in places}
+    beginnings = [place for place in places if members[place] & set(known.tolist())]
+    if not beginnings:
+        raise InputError("known", "a point that belongs to a set of points", known.tolist())
+    processed: list[tuple[int, int]] = []
+
+    def propagate(place: tuple[int, int]) -> None:
+        if place in processed:
+            return
+        processed.append(place)
+        for level in (place[0] - 1, place[0] + 1):
+            for other in places:
+                if other[0] == level and members[other] & members[place]:
+                    propagate(other)
+
+    propagate(beginnings[0])
+    return processed
+
+
+def _check_sets(sets: PointSets, count: int) -> list[list[Int[Array, " s"]]]:
+    checked = [[np.asarray(points, dtype=np.intp) for points in level] for level in sets]
+    if not any(checked):
+        raise InputError("layout", "at least one set of points", "none")
+    for points in (points for level in checked for points in level):
+        if points.size == 0 or points.min() < 0 or points.max() >= count:
+            raise InputError("statistics", "all points of the layout's sets", f"{count} points")
+    return checked
+
+
+def _fitted(statistics: Array, sets: PointSets, components: int | Sequence[int]) -> list[list[Pca]]:
+    """Each set's principal components."""
+    counts = [components] * len(sets) if isinstance(components, int) else list(components)
+    if len(counts) != len(sets):
+        raise InputError("components", f"one number, or {len(sets)} for as many levels", counts)
+    return [
+        [fit_pca(statistics[:, points].reshape(len(statistics), -1), count) for points in level]
+        for level, count in zip(sets, counts, strict=True)
+    ]
+
+
+def _check_not_negative(name: str, value: float) -> float:
+    number = float(check_array(name, value, ()))
+    if number < 0:
+        raise InputError(name, "a number of 0 or more", value)
+    return number
+
+
+def _distance(found: Array, given: Array) -> float:
+    return float(np.linalg.norm(found - given, axis=1).mean())

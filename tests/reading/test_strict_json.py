@@ -1,0 +1,130 @@
+"""The one reader of JSON: whatever a file holds, one line tells what and where."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mien.errors import Broken, FileFormatError, InputError
+from mien.limits import MAX_CONTAINERS, MAX_DEPTH, MAX_DIGITS, MAX_JSON_BYTES
+from mien.reading.strict_json import as_array, as_names, as_number, as_whole, read_json, unknown
+
+
+def read(folder: Path, content: bytes) -> dict:
+    path = folder / "a.json"
+    path.write_bytes(content)
+    return read_json(path)
+
+
+def nested(depth: int) -> bytes:
+    return b'{"a": ' + b"[" * (depth - 1) + b"]" * (depth - 1) + b"}"
+
+
+def test_the_deepest_and_the_longest_pass(tmp_path: Path) -> None:
+    assert read(tmp_path, b'\xef\xbb\xbf{"a": 1}') == {"a": 1}
+    read(tmp_path, nested(MAX_DEPTH))
+    assert read(tmp_path, b'{"a": %s}' % (b"7" * MAX_DIGITS))["a"] > 10**999
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"", "expected JSON in UTF-8, found an empty file"),
+        (b"{\n x", "line 2, column 2: expected JSON: "),
+        (b"[1]", "expected an object, found a list"),
+        (b"null", "expected an object, found null"),
+        (b'{"a": {"b": 1, "b": 2}}', "b: the name appears twice"),
+        (b"\xff\xfe{}", "expected JSON in UTF-8, found other bytes"),
+        (nested(MAX_DEPTH + 1), "expected lists and objects at most 64 deep, found deeper ones"),
+        (nested(900), "expected lists and objects at most 64 deep, found deeper ones"),
+        (b"[" * 200_000, "expected lists and objects at most 64 deep, found deeper ones"),
+        (b'{"a":' * 200_000, "expected lists and objects at most 64 deep, found deeper ones"),
+        (
+            b'{"a":\n%s}' % (b"7" * 5000),
+            "line 2: expected numbers of at most 1000 digits, found 5000",
+        ),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_what_is_wrong_is_told_in_one_line(tmp_path: Path, content: bytes, problem: str) -> None:
+    with pytest.raises(FileFormatError) as caught:
+        read(tmp_path, content)
+    assert str(caught.value).startswith(f"{tmp_path / 'a.json'}: {problem}")
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_too_much_is_told_at_once(tmp_path: Path) -> None:
+    start = time.perf_counter()
+    with pytest.raises(FileFormatError, match="expected at most 4000000 lists and objects"):
+        read(tmp_path, b'{"a": [%s]}' % (b"[]," * MAX_CONTAINERS))
+    with pytest.raises(FileFormatError, match=r"expected at most 64 MiB, found 64\.0"):
+        read(tmp_path, b" " * (MAX_JSON_BYTES + 1))
+    assert time.perf_counter() - start < 2
+
+
+def test_what_is_no_file_is_told_at_once(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="expected a readable file, got No such file"):
+        read_json(tmp_path / "none.json")
+    with pytest.raises(InputError, match="expected a readable file, got a folder"):
+        read_json(tmp_path)
+    with pytest.raises(InputError, match="a name that none can have"):
+        read_json("a\0b.json")
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe.json")
+        with pytest.raises(InputError, match="expected a readable file, got a pipe"):
+            read_json(tmp_path / "pipe.json")
+
+
+def test_the_largest_documents_are_read_in_seconds(tmp_path: Path) -> None:
+    start = time.perf_counter()
+    count = MAX_CONTAINERS - 10
+    assert len(read(tmp_path, b'{"a": [%s{}]}' % (b"{}," * count))["a"]) == count + 1
+    assert time.perf_counter() - start < 10
+
+
+@pytest.mark.parametrize("text", ["NaN", "Infinity", "-Infinity", "1e999", "1" * 400])
+def test_numbers_that_are_not_finite_are_told_where_they_are(text: str) -> None:
+    with pytest.raises(Broken, match=r"a\[1\]: expected a finite number, found (nan|-?inf)"):
+        as_array(json.loads(f"[1, {text}]"), "a", (2,))
+
+
+def test_limits_of_numbers() -> None:
+    assert as_number(1, "a", least=0, most=1) == 1.0
+    with pytest.raises(Broken, match=r"a: expected a number from -0\.5 to 1\.5, found 50"):
+        as_number(50, "a", least=-0.5, most=1.5)
+    with pytest.raises(Broken, match="a: expected a number above 0 and at most 10, found 0"):
+        as_number(0, "a", above=0, most=10)
+    with pytest.raises(Broken, match=r"a: expected a number from -1e\+09 to 1e\+09, found 1e\+30"):
+        as_number(10**30, "a")
+    for value in (True, 1.5, "1", None):
+        with pytest.raises(Broken, match="a: expected a whole number, found "):
+            as_whole(value, "a")
+
+
+def test_arrays_have_the_shape_that_is_expected() -> None:
+    np.testing.assert_array_equal(as_array([[1, 2.5], [3, 4]], "a", (2, 2)), [[1, 2.5], [3, 4]])
+    with pytest.raises(Broken, match="a: expected 2 lists, found 1"):
+        as_array([[1, 2]], "a", (2, 2))
+    with pytest.raises(Broken, match=r"a\[1\]: expected 2 numbers, found 3"):
+        as_array([[1, 2], [3, 4, 5]], "a", (2, 2))
+    with pytest.raises(Broken, match=r"a\[0\]\[1\]: expected a number, found true or false"):
+        as_array([[1, True], [3, 4]], "a", (2, 2))
+
+
+def test_names_are_there_once() -> None:
+    assert as_names(["a", "b"], "parts") == ("a", "b")
+    with pytest.raises(Broken, match="parts: 'a' appears twice"):
+        as_names(["a", "b", "a"], "parts")
+    with pytest.raises(Broken, match=r"parts\[1\]: expected text, found null"):
+        as_names(["a", None], "parts")
+
+
+def test_names_of_a_million_letters_are_cut_short() -> None:
+    start = time.perf_counter()
+    assert len(unknown("unit", "a" * 1_000_000, [f"unit{i}" for i in range(1000)])) < 300
+    assert time.perf_counter() - start < 1

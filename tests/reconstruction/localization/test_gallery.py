@@ -1,0 +1,66 @@
+"""Pictures painted with the colours of photos."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from marbled import GENERIC, Person, at
+from mien.camera import Camera
+from mien.capture.source import View
+from mien.reconstruction.localization.gallery import Gallery, reduced, resized_to
+
+Known = list[tuple[View, Camera]]
+
+
+@pytest.fixture(scope="module")
+def gallery(ann: Person, frontal: Known) -> Gallery:
+    return Gallery(frontal, ann.vertices, GENERIC)
+
+
+def test_from_a_photos_own_place_the_photo_is_painted(gallery: Gallery, frontal: Known) -> None:
+    view, camera = frontal[1]
+    painting = gallery.paint(camera)
+    off = painting.grey.astype(float) - view.photo.pixels[..., 0]
+    assert painting.known.mean() > 0.15
+    assert np.abs(off[painting.known]).mean() < 2
+
+
+def test_between_the_photos_the_truth_is_painted(gallery: Gallery, ann: Person) -> None:
+    camera = at(60.0, 5.0)
+    painting, photo = gallery.paint(camera), ann.seen_by(camera).photo.pixels[..., 0]
+    known = painting.known
+    assert known.sum() > 0.5 * np.isfinite(painting.places[..., 0]).sum()
+    assert np.corrcoef(painting.grey[known], photo[known])[0, 1] > 0.95
+
+
+def test_places_are_those_behind_the_pixels(gallery: Gallery) -> None:
+    camera = at(-75.0)
+    painting = gallery.paint(camera)
+    rows, columns = np.nonzero(painting.known)
+    found = camera.project(painting.places[rows, columns])
+    np.testing.assert_allclose(found, np.column_stack([columns, rows]) + 0.5, atol=1e-2)
+
+
+def test_nothing_is_known_of_the_back(gallery: Gallery) -> None:
+    seen_from_behind = gallery.paint(at(180.0))
+    assert np.isfinite(seen_from_behind.places).any()
+    assert seen_from_behind.known.mean() < 0.02
+
+
+def test_a_photo_that_shows_something_else_there_is_not_asked(ann: Person, frontal: Known) -> None:
+    """The nose hides what is beyond from a camera on its other side."""
+    left_only = Gallery(frontal[2:], ann.vertices, GENERIC).paint(at(-30.0))
+    both = Gallery(frontal, ann.vertices, GENERIC).paint(at(-30.0))
+    assert left_only.known.sum() < 0.7 * both.known.sum()
+
+
+def test_reduced_photo_and_its_camera_agree() -> None:
+    camera = at(20.0)
+    grey = reduced(np.zeros((camera.height, camera.width, 3), np.uint8), 0.37)
+    small = resized_to(camera, grey.shape)
+    assert grey.shape == (small.height, small.width) == (166, 142)
+    places = GENERIC.mesh.vertices
+    scale = np.array([small.width / camera.width, small.height / camera.height])
+    np.testing.assert_allclose(small.project(places), camera.project(places) * scale, atol=0.2)
+    assert reduced(np.zeros((5, 7, 3), np.uint8), 3.0).shape == (5, 7)

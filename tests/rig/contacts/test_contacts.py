@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from mien.assets.generic import load_generic_head
+from mien.errors import InputError
+from mien.rig.contacts.contacts import Contacts, Mechanics
+from mien.rig.followers import Followers, part_vertices
+from mien.rig.gaze import LOOK_UNITS
+
+if TYPE_CHECKING:
+    from conftest import Rigged
+
+GENERIC = load_generic_head()
+
+
+def test_without_contact_the_very_same_array_comes_back(rigged: Rigged) -> None:
+    contacts = rigged.mechanics.contacts
+    for posed in (rigged.neutral, rigged.posed(jawOpen=0.4), rigged.posed(browInnerUp=1.0)):
+        assert contacts.resolved(posed) is posed
+
+
+def test_the_input_is_not_written_to(rigged: Rigged) -> None:
+    posed = rigged.posed(eyeBlinkLeft=1.0, eyeLookDownLeft=1.0)
+    kept = posed.copy()
+    resolved = rigged.mechanics.contacts.resolved(posed)
+    np.testing.assert_array_equal(posed, kept)
+    assert np.abs(resolved - posed).max() > 0.5
+
+
+def test_a_mouth_closes_only_as_far_as_the_jaw_is_open(rigged: Rigged) -> None:
+    alone = rigged.living(mouthClose=1.0)
+    np.testing.assert_allclose(alone, rigged.neutral, atol=1e-5)
+    np.testing.assert_allclose(
+        rigged.living(mouthClose=0.8, jawOpen=0.3),
+        rigged.living(mouthClose=0.3, jawOpen=0.3),
+        atol=1e-5,
+    )
+
+
+def test_what_is_taken_over_is_said() -> None:
+    assert set(Mechanics.taken_over) == {*LOOK_UNITS, "mouthClose"}
+    assert set(Mechanics.taken_over) <= set(GENERIC.unit_names)
+
+
+def test_lashes_go_with_the_lid(rigged: Rigged) -> None:
+    posed = rigged.posed(eyeBlinkLeft=1.0, eyeLookDownLeft=1.0)
+    moved = rigged.mechanics.contacts.resolved(posed) - posed
+    followers = rigged.mechanics.contacts.followers
+    lashes = np.isin(followers.vertices, part_vertices(GENERIC, "lashes"))
+    skin = moved[followers.carriers[lashes]]
+    assert np.abs(moved[followers.vertices[lashes]]).max() > 0.5
+    assert (moved[followers.vertices[lashes]] <= skin.max(axis=1) + 1e-9).all()
+    assert (moved[followers.vertices[lashes]] >= skin.min(axis=1) - 1e-9).all()
+
+
+def test_followers_that_nothing_carries_are_left_out(rigged: Rigged) -> None:
+    contacts = rigged.mechanics.contacts
+    touching = [*contacts.lids, contacts.lips.upper, contacts.lips.lower]
+    moves = np.zeros_like(rigged.neutral)
+    moves[np.concatenate([item.vertices for item in touching])] = [1.0, 2.0, 3.0]
+    whole, some = Followers.of(GENERIC), contacts.followers
+    expected = np.zeros_like(moves)
+    expected[whole.vertices] = whole.carried(moves)
+    moved = expected.any(axis=1)
+    np.testing.assert_array_equal(np.flatnonzero(moved), some.vertices)
+    np.testing.assert_allclose(some.carried(moves), expected[moved])
+
+
+def test_bad_vertices_are_refused() -> None:
+    with pytest.raises(InputError, match=r"vertices: expected shape"):
+        Contacts.of(GENERIC, np.zeros((3, 3)))
+    with pytest.raises(InputError, match=r"units: expected shape"):
+        Mechanics.of(GENERIC, GENERIC.mesh.vertices, np.zeros((3, 3, 3)))

@@ -1,0 +1,75 @@
+"""Feature points on heads (Z06 section 9)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from marbled import GENERIC
+from mien.assets.feature_points import load_feature_layout
+from mien.rig.followers import part_vertices
+from mien.rig.gaze import with_turned_eyes
+from mien.synthesis.heads.points import feature_points_on, skin_with_points
+from people import person
+
+LAYOUT = load_feature_layout()
+POINTS = feature_points_on(GENERIC.mesh.vertices)
+PUPILS = np.array(["pupil" in name for name in LAYOUT.names])
+INSIDE = np.array(["teeth" in name or "lip_inner" in name for name in LAYOUT.names])
+
+
+def test_points_lie_where_their_names_say():
+    for name in ("nose_tip", "chin", "nose_root"):
+        vertex = GENERIC.mesh.vertices[GENERIC.vertex_of(name)]
+        assert np.linalg.norm(POINTS[LAYOUT.index(name)] - vertex) < 5
+    right = [name.startswith("right_") for name in LAYOUT.names]
+    assert POINTS[right, 0].max() < 0
+
+
+def test_points_are_as_symmetric_as_the_landmarks_attached():
+    mirrored = POINTS[LAYOUT.mirror] * [-1, 1, 1]
+    np.testing.assert_allclose(mirrored, POINTS, atol=3)
+
+
+def test_points_of_many_heads_at_once():
+    heads = np.stack([person(1), person(2)])
+    np.testing.assert_allclose(feature_points_on(heads)[1], feature_points_on(heads[1]))
+
+
+def test_points_of_offsets_are_offsets_of_points():
+    moved = feature_points_on(GENERIC.mesh.vertices + GENERIC.unit_offsets[3])
+    np.testing.assert_allclose(
+        moved - POINTS, feature_points_on(GENERIC.unit_offsets[3]), atol=1e-5
+    )
+
+
+def test_pupils_turn_with_the_eyes():
+    turned = with_turned_eyes(GENERIC.mesh.vertices, np.full((2, 2), [0.3, 0.0]), GENERIC)
+    moved = feature_points_on(turned) - POINTS
+    assert PUPILS.sum() == 2
+    assert (moved[PUPILS, 0] > 2).all()
+    np.testing.assert_allclose(moved[~PUPILS], 0, atol=1e-12)
+
+
+def test_skin_goes_where_its_points_go(rng):
+    asked = rng.normal(size=POINTS.shape)
+    asked[PUPILS | INSIDE] = 0
+    found = feature_points_on(person(4) + skin_with_points() @ asked) - feature_points_on(person(4))
+    np.testing.assert_allclose(found[~(PUPILS | INSIDE)], asked[~(PUPILS | INSIDE)], atol=0.1)
+
+
+def test_a_movement_of_all_points_is_one_of_the_face():
+    along = skin_with_points().sum(axis=1)
+    face = part_vertices(GENERIC, "skin")
+    inside = GENERIC.regions["mouth_cavity"] + GENERIC.regions["eye_socket"]
+    near = cKDTree(POINTS).query(GENERIC.mesh.vertices)[0] < 8
+    face = face[(near & (inside == 0) & (GENERIC.mesh.vertex_normals()[:, 2] > 0.3))[face]]
+    np.testing.assert_allclose(along[face], 1, atol=0.2)
+    away = GENERIC.mesh.vertices[:, 2] < -120
+    assert np.abs(along[away]).max() < 0.1
+
+
+@pytest.mark.parametrize("part", ["left_eyeball", "upper_teeth", "tongue"])
+def test_what_is_not_skin_stays(part):
+    assert not skin_with_points()[part_vertices(GENERIC, part)].any()
