@@ -26,9 +26,11 @@ class Case:
     """A way to fit one person.
 
     Attributes:
-        title: of the row. person: folder of the scan. photos: folder of the photos.
+        title: of the row.
+        person: folder of the scan.
+        photos: folder of the photos.
         annotated: with the hand annotations beside the photos.
-        adjust: with the joint adjustment; without it, P02's own way.
+        adjust: with the joint adjustment; without it, [Pighin 2002]'s own way.
         dense: with the photos registered by all the skin that they share.
     """
 
@@ -44,7 +46,13 @@ _JAMES = Path(__file__).parents[1] / "src" / "mien" / "assets" / "data" / "james
 _EMILY = DATA / "emily" / "renders_mentalray"
 CASES = (
     Case("James, 2 photos, hand annotations", "james", _JAMES, annotated=True),
-    Case("the same, `--no-adjust` (P02's own way)", "james", _JAMES, annotated=True, adjust=False),
+    Case(
+        "the same, `--no-adjust` ([Pighin 2002]'s own way)",
+        "james",
+        _JAMES,
+        annotated=True,
+        adjust=False,
+    ),
     Case("James, nothing marked", "james", _JAMES),
     Case("the same, landmarks only (`--no-dense`)", "james", _JAMES, dense=False),
     Case("Emily, 7 photos, nothing marked", "emily", _EMILY),

@@ -30,9 +30,12 @@ def within_shares(
     """Shares that the best unbiased estimate, without priors, would bring within given errors.
 
     Args:
-        angle: radians, of rotation. relative: of focal length.
-    Returns: the share of cameras within `angle`, within `relative`, and how often all are
-        within both; errors drawn from the bound's covariance, gauge fixed on the points.
+        angle: radians, of rotation.
+        relative: of focal length.
+
+    Returns:
+        the share of cameras within `angle`, within `relative`, and how often all are within both;
+        errors drawn from the bound's covariance, gauge fixed on the points.
     """
     photos = len(scene.cameras)
     size = POSE_SIZE * photos + photos

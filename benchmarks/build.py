@@ -40,7 +40,8 @@ class Result:
     """Both builds of one folder of photos.
 
     Attributes:
-        mien, eos: how long and how large; eos is None where it is not installed.
+        mien: how long and how large; eos is None where it is not installed.
+        eos: how long and how large; eos is None where it is not installed.
         rms_px: reprojection error of the landmarks, by whose head.
         surface_mm: median distance of the face from the head in the photos, by whose; none where
             that head is not known.

@@ -121,7 +121,7 @@ class Trial:
         return likeness(self.drawn(row, shares), self.face.frames[row], face_mask(self.face, row))
 
     def sheet(self, rows: Sequence[int]) -> UInt8[Array, "h w 3"]:
-        """Z06's Figs. 10 and 11: the frame, neutral warped, nearest example warped, synthesised."""
+        """[Zhang 2006]'s Figs. 10 and 11: frame, neutral warped, nearest example warped, result."""
         lines = []
         for row in rows:
             window = _window(self.face, row)

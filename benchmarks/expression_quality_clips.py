@@ -44,9 +44,12 @@ class FilmedFace:
     """The frames of a clip in which a face was found.
 
     Attributes:
-        frames: (h, w, 3) each. index: (N,) their numbers in the clip.
-        landmarks: (N, 478, 2) px. points: (N, n, 2) px of the layout.
-        pose: (N, 2) yaw and pitch, radians. sharpness: (N,).
+        frames: (h, w, 3) each.
+        index: (N,) their numbers in the clip.
+        landmarks: (N, 478, 2) px.
+        points: (N, n, 2) px of the layout.
+        pose: (N, 2) yaw and pitch, radians.
+        sharpness: (N,).
     """
 
     layout: FeatureLayout
@@ -154,7 +157,8 @@ class Likeness:
     """How near a picture comes to the true one, over a mask.
 
     Attributes:
-        psnr: dB. ssim: of brightness, windows of 11 px.
+        psnr: dB.
+        ssim: of brightness, windows of 11 px.
         detail: deviation of what is finer than 2 px, in shares of the true picture's: 1 is as
             sharp, less is blurred.
     """

@@ -40,8 +40,8 @@ EXPRESSIONS = 25
 
 NEUTRAL, NEAREST = "neutral's texture", "the nearest expression's"
 SYNTHESISED = "synthesised"
-BY_PAPER = "synthesised as Z06 prints it"
-BY_REGIONS = "P02's regions, by the tracker"
+BY_PAPER = "synthesised as [Zhang 2006] prints it"
+BY_REGIONS = "[Pighin 2002]'s regions, by the tracker"
 Making = Callable[[PosedFace, Array], PosedFace]
 
 
@@ -50,8 +50,11 @@ class Tracked:
     """A head in the frames of a clip that it was not made from.
 
     Attributes:
-        frames: (h, w, 3) each. found: likewise, none of them lost. track: what they are of.
-        faces: as the tracker left them. points: (N, n, 3) mm, head space.
+        frames: (h, w, 3) each.
+        found: likewise, none of them lost.
+        track: what they are of.
+        faces: as the tracker left them.
+        points: (N, n, 3) mm, head space.
     """
 
     head: Head

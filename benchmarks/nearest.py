@@ -129,7 +129,9 @@ def _box_gap(point: Array, low: Array, high: Array) -> float:
 def _on_triangle(p: Array, corners: Array, out: Array) -> float:
     """Write the nearest point of a triangle; squared distance to it.
 
-    Source: Ericson, Real-Time Collision Detection, 2005, sec. 5.1.5: which corner, edge or the
+    Source:
+        Ericson, Real-Time Collision Detection, 2005, sec. 5.1.5: which corner, edge or the
+
     face is nearest follows from the signs of six dot products.
     """
     a, b, c = corners[0], corners[1], corners[2]

@@ -32,8 +32,10 @@ class Outcome:
     """A fit beside the scan.
 
     Attributes:
-        vertices: (V, 3) mm of the fitted head; unfitted: (V, 3) mm, the generic head laid on it.
-        fitted, generic: their errors at the same samples.
+        vertices: (V, 3) mm of the fitted head.
+        unfitted: (V, 3) mm, the generic head laid on it.
+        fitted: their errors at the same samples.
+        generic: their errors at the same samples.
         degrees: per photo after the first, error of its turn from the first.
         focal: per photo, relative error of the focal length.
     """

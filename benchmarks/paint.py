@@ -20,7 +20,8 @@ class Hits:
     """Places on a mesh.
 
     Attributes:
-        triangles: (N,) index of the triangle of each; barycentrics: (N, 3) place in it.
+        triangles: (N,) index of the triangle of each.
+        barycentrics: (N, 3) place in it.
     """
 
     triangles: Int[Array, " n"]
@@ -66,8 +67,10 @@ class Projector:
     """A photo thrown back onto the surface that it shows.
 
     Attributes:
-        camera, photo: (H, W, 3) uint8.
-        depth: (H, W, 1) mm of the surface; weight: (H, W, 1) how well each pixel shows it.
+        camera: (H, W, 3) uint8.
+        photo: (H, W, 3) uint8.
+        depth: (H, W, 1) mm of the surface.
+        weight: (H, W, 1) how well each pixel shows it.
     """
 
     camera: Camera

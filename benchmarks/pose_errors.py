@@ -23,7 +23,9 @@ class Errors:
     """Of one scene, after the similarity that best aligns the points seen twice is removed.
 
     Attributes:
-        degrees: (K,) rotation. focal: (K,) relative. surface_mm: median over points seen twice.
+        degrees: (K,) rotation.
+        focal: (K,) relative.
+        surface_mm: median over points seen twice.
     """
 
     degrees: Float[Array, " k"]
@@ -49,7 +51,7 @@ def measure(cameras: Sequence[Camera | None], points: Array, scene: Scene) -> Er
 
 
 def recover(scene: Scene, head: FeatureHead) -> PoseResult:
-    """P02's five steps from the generic head's points, nothing else known."""
+    """[Pighin 2002]'s five steps from the generic head's points, nothing else known."""
     return recover_pose(scene.image_points, head.points, scene.sizes)
 
 

@@ -21,7 +21,7 @@ def convergence_plot(head: FeatureHead, scenes: int = 12) -> None:
 
     counts = np.unique(np.geomspace(1, 150, 24).round().astype(int))
     figure, axes = plt.subplots(figsize=(6.4, 3.6), constrained_layout=True)
-    for history, colour, name in ((0, PLAIN, "P02's sweeps"), (10, FAST, "accelerated")):
+    for history, colour, name in ((0, PLAIN, "[Pighin 2002]'s sweeps"), (10, FAST, "accelerated")):
         for seed in range(scenes):
             scene = random_scene(np.random.default_rng(seed), head)
             costs = [

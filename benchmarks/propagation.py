@@ -1,4 +1,4 @@
-"""All feature points from a few, as Z06 prints it beside a closed form (Fig. 12).
+"""All feature points from a few, as [Zhang 2006] prints it beside a closed form (Fig. 12).
 
 Run: python -m benchmarks.propagation
 """
@@ -241,7 +241,8 @@ def main() -> int:
     parts += ["## By iteration, from 17 points", iterations]
     parts += ["## The stop rule", "Points that were not given.", stop_rule(layout, clips)]
     parts += ["## What was tried", "Points that were not given.", what_was_tried(layout, clips)]
-    write_results("propagation", "All feature points from a few (Z06 sec. 10, Fig. 12)", parts)
+    title = "All feature points from a few ([Zhang 2006] sec. 10, Fig. 12)"
+    write_results("propagation", title, parts)
     return 0
 
 

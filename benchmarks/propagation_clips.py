@@ -19,7 +19,7 @@ BLOCK = 15
 """Frames that stay together, so that no held-out frame has its neighbour among the learned."""
 EXPRESSIONS = 25
 IMAGE_HEIGHT = 1000
-"""Of Z06's images, 750 wide: clips are cut to that shape at their full height."""
+"""Of [Zhang 2006]'s images, 750 wide: clips are cut to that shape at their full height."""
 
 
 def _sides(*names: str) -> tuple[str, ...]:

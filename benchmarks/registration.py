@@ -42,7 +42,9 @@ class Case:
     """Photos to fit a head to.
 
     Attributes:
-        title: of the row. folder: of the scan and its cameras. photos: their folder.
+        title: of the row.
+        folder: of the scan and its cameras.
+        photos: their folder.
         stems: of the photos to use; None for all.
     """
 
@@ -57,9 +59,11 @@ class Result:
     """A fit and its errors.
 
     Attributes:
-        same, generic_same: distances to the same surface point, of the fitted and the generic head.
+        same: distances to the same surface point, of the fitted and the generic head.
+        generic_same: as `same`.
         calibration: None where the truth has no vertices.
-        used, total: photos in the fit, and those there were.
+        used: photos in the fit, and those there were.
+        total: photos in the fit, and those there were.
         seconds: of the fit alone.
     """
 

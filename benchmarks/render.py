@@ -30,9 +30,11 @@ class Drawn:
     """What one program measured.
 
     Attributes:
-        fps: over all frames. best_fps: of the fastest tenth, when nothing else ran.
+        fps: over all frames.
+        best_fps: of the fastest tenth, when nothing else ran.
         cpu_ms: of all threads, a frame.
-        peak_mb: of resident memory. growth_mb: from the first frames to the last.
+        peak_mb: of resident memory.
+        growth_mb: from the first frames to the last.
     """
 
     fps: float
@@ -54,7 +56,8 @@ def draw(
 ) -> Drawn:
     """For some seconds, or at least so many frames, in a process of its own.
 
-    Raises: CalledProcessError: it failed.
+    Raises:
+        CalledProcessError: it failed.
     """
     values = map(str, (*size, textures, texels, frames, picture))
     command = [sys.executable, "-m", f"benchmarks.{module}", *values]

@@ -1,4 +1,4 @@
-"""OpenGL draws the scene in passes, as P02 does. Run by benchmarks.render in its own process."""
+"""OpenGL draws the scene in passes, as [Pighin 2002] does. benchmarks.render runs it on its own."""
 
 from __future__ import annotations
 

@@ -29,7 +29,8 @@ class Scene:
 
     Attributes:
         mesh: the generic head, only the parts that pictures show.
-        textures: K, synthetic. faces: FACES moments of a movement that closes.
+        textures: K, synthetic.
+        faces: FACES moments of a movement that closes.
     """
 
     mesh: Mesh
@@ -85,7 +86,8 @@ def measure(draw: Callable[[int], Array], seconds: float, frames: int, picture: 
 
     Args:
         draw: the picture of a face by its number, (H, W, 4) uint8.
-        seconds: to draw for at least. frames: at least this many.
+        seconds: to draw for at least.
+        frames: at least this many.
         picture: where face 5 is kept.
     """
     np.save(picture, draw(5))

@@ -49,8 +49,10 @@ def portrait_camera(
     """A camera that fills its image with the subject's face.
 
     Args:
-        yaw, pitch, roll: degrees; positive sees more of the left side, from above, and turns the
-            camera so that the head seems to turn counter-clockwise.
+        yaw: degrees; positive sees more of the left side, from above, and turns the camera so that
+            the head seems to turn counter-clockwise.
+        pitch: as `yaw`.
+        roll: as `yaw`.
         closer: factor on the distance at which the portrait fills the image's height.
     """
     turn_y, turn_x, turn_z = rotation_from_vector(
@@ -112,8 +114,10 @@ class Plan:
 
     Attributes:
         subject: makes who is photographed.
-        yaws: degrees, one a photo. pitches: degrees, taken in turn.
-        size: (width, height) px. focal_px: (least, most).
+        yaws: degrees, one a photo.
+        pitches: degrees, taken in turn.
+        size: (width, height) px.
+        focal_px: (least, most).
         degrade: exposure, white balance and noise differ between the photos.
         expression: weights of face units in one photo, the middle one, of a person on mien's mesh.
         seed: of everything that varies at random.

@@ -31,7 +31,8 @@ class Calibration:
     """Shares of vertices that lie within two of their uncertainties from the truth.
 
     Attributes:
-        face: of those of the face that a photo shows. skin: of all skin vertices.
+        face: of those of the face that a photo shows.
+        skin: of all skin vertices.
     """
 
     face: float

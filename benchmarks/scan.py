@@ -84,7 +84,8 @@ class Samples:
     """Points fixed to a mesh, so that the same places are compared on every head.
 
     Attributes:
-        triangles: (N, 3) vertices of the triangle that holds each; barycentrics: (N, 3) in it.
+        triangles: (N, 3) vertices of the triangle that holds each.
+        barycentrics: (N, 3) in it.
     """
 
     triangles: Int[Array, "n 3"]

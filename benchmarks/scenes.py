@@ -33,7 +33,8 @@ class FeatureHead:
     """Feature points of the generic head and how people differ.
 
     Attributes:
-        points: (N, 3) mm, the first `first` of them P02's 13. normals: (N, 3) outward.
+        points: (N, 3) mm, the first `first` of them [Pighin 2002]'s 13.
+        normals: (N, 3) outward.
         components: (C, N, 3) mm, for independent coefficients of deviation 1.
         detail_mm: deviation of what the components leave out.
     """
@@ -60,7 +61,9 @@ class Scene:
     """A person, the cameras, and where they see the person's points.
 
     Attributes:
-        points: (N, 3) mm. cameras: K. image_points: (K, N, 2) px with noise, NaN where hidden.
+        points: (N, 3) mm.
+        cameras: K.
+        image_points: (K, N, 2) px with noise, NaN where hidden.
         sizes: (K, 2) px.
     """
 
@@ -74,7 +77,7 @@ class Scene:
 
 
 def generic_features(*, more: int = 99, detail_mm: float = 1.0) -> FeatureHead:
-    """P02's 13 points and `more` others, spread evenly over the generic head's polylines.
+    """[Pighin 2002]'s 13 points and `more` others, spread evenly over the generic head's polylines.
 
     What the identity basis leaves out of a person is taken to be `detail_mm` at every point.
     """

@@ -62,7 +62,8 @@ def peak_mb() -> float:
 def run_measured(module: str, arguments: Sequence[object], *, warm_up: bool = True) -> Run:
     """What `python -m module arguments` measures, run once before for what compiles and is cached.
 
-    Raises: CalledProcessError: it failed; what it said is on stderr.
+    Raises:
+        CalledProcessError: it failed; what it said is on stderr.
     """
     command = [sys.executable, "-m", module, *map(str, arguments)]
     for _ in range(2 if warm_up else 1):

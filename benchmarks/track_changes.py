@@ -1,4 +1,4 @@
-"""What is done to the frames of a known performance (P02 sec. 6.2), and more."""
+"""What is done to the frames of a known performance ([Pighin 2002] sec. 6.2), and more."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Change:
 
 
 def changes() -> tuple[Change, ...]:
-    """All of P02's, and those that the issue of tracking adds."""
+    """All of [Pighin 2002]'s, and those that the issue of tracking adds."""
     gains = {
         "colours x 0.7": (0.7, 0.7, 0.7),
         "colours x 1.3": (1.3, 1.3, 1.3),
@@ -91,6 +91,7 @@ def covering(
     scene: Performance, *, moving: bool, share: float = 0.25
 ) -> tuple[Bool[Array, "h w"], ...]:
     """(H, W) of every frame: a hand before the face, as large as makes it cover this share of the
+
     face in the mean.
 
     It stays at the cheek and the corner of the mouth, or wanders over the face and back.

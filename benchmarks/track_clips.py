@@ -48,8 +48,10 @@ class Clip:
     """A clip that was tracked, and what was found in its frames.
 
     Attributes:
-        frames: (H, W, 3) each. followed: by mien.
-        alone: MediaPipe's faces in each frame for itself. peer: in video mode, smoothed over time.
+        frames: (H, W, 3) each.
+        followed: by mien.
+        alone: MediaPipe's faces in each frame for itself.
+        peer: in video mode, smoothed over time.
         reprojection: (N,) percent of the distance of the eyes, each frame's median.
         psnr: (N,) dB over the face. NaN where a frame is lost.
     """
@@ -137,8 +139,10 @@ class Tremble:
     """Jitter on the same still frames.
 
     Attributes:
-        mien: as tracked. smoothed: with SMOOTH seconds.
-        peer: MediaPipe in video mode. alone: MediaPipe frame by frame.
+        mien: as tracked.
+        smoothed: with SMOOTH seconds.
+        peer: MediaPipe in video mode.
+        alone: MediaPipe frame by frame.
     """
 
     mien: Jitter

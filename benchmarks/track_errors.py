@@ -36,7 +36,8 @@ def shape_errors(
     Mixtures that look alike may have weights that differ; this tells whether they do look alike.
 
     Args:
-        rigs: of the found and of the true head. mask: (V,) weights of the vertices.
+        rigs: of the found and of the true head.
+        mask: (V,) weights of the vertices.
     """
     errors = np.full(len(true.frames), np.nan)
     for index, a, b in _pairs(found, true):

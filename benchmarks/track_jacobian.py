@@ -1,4 +1,4 @@
-"""The Jacobian analytic and by differences, beside each other (P02 sec. 6.1.3, 6.2).
+"""The Jacobian analytic and by differences, beside each other ([Pighin 2002] sec. 6.1.3, 6.2).
 
 Run: python -m benchmarks.track_jacobian HEAD
 """

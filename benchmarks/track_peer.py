@@ -24,7 +24,8 @@ class PeerFace:
     """What it finds in a frame.
 
     Attributes:
-        points: (478, 2) px. blendshapes: (52,).
+        points: (478, 2) px.
+        blendshapes: (52,).
         rotation: (3, 3), translation: (3,) mm, from its canonical face to mien's camera space.
     """
 

@@ -29,7 +29,7 @@ COLUMNS = 8
 
 
 def synthetic(detector: LandmarkDetector) -> None:
-    """P02's figs. 10 and 12 to 16: a made-up head, so that anyone can repeat it."""
+    """[Pighin 2002]'s figs. 10 and 12 to 16: a made-up head, so that anyone can repeat it."""
     whole = made_up_head()
     head = with_expressions(whole, choose_three(whole))
     scene = perform(head, background=cluttered(300, np.random.default_rng(6)))
@@ -44,7 +44,7 @@ def synthetic(detector: LandmarkDetector) -> None:
 
 
 def real(detector: LandmarkDetector, path: Path, head: Head, *, first: int, count: int) -> None:
-    """P02's fig. 17: frames of a clip that may be shown, and what was found in them."""
+    """[Pighin 2002]'s fig. 17: frames of a clip that may be shown, and what was found in them."""
     frames = [frame.pixels() for frame in Video(path).frames() if first <= frame.index][:count]
     focal = float(np.median([view.camera.focal_px for view in head.views]))
     fps = Video(path).facts().fps

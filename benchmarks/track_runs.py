@@ -23,7 +23,8 @@ class Followed:
     """What the tracker found, and how long it took.
 
     Attributes:
-        track: of all frames. seconds: (N,) one a frame.
+        track: of all frames.
+        seconds: (N,) one a frame.
     """
 
     track: Track

@@ -1,7 +1,10 @@
-"""A performance that is known exactly: head, path, weights and every frame of it (P02 sec. 6.2).
+"""A performance that is known exactly: head, path, weights and every frame of it.
 
 Three expressions are blended uniformly over the whole face while the head turns by 25 degrees to
 either side, nods, tilts and moves along all three axes.
+
+Source:
+    [Pighin 2002] sec. 6.2.
 """
 
 from __future__ import annotations
@@ -76,7 +79,8 @@ class Performance:
 
     Attributes:
         head: with the expressions that are shown, neutral first, and no others.
-        truth: exact. frames: (H, W, 3), one a frame of the truth.
+        truth: exact.
+        frames: (H, W, 3), one a frame of the truth.
     """
 
     head: Head
@@ -159,7 +163,8 @@ def _exactly(frame: int, state: TrackState) -> TrackedFrame:
 def choose_three(head: Head) -> tuple[str, str, str]:
     """Neutral and the expressions of this head that are likest to anger and joy.
 
-    Raises: InputError: it has fewer than three.
+    Raises:
+        InputError: it has fewer than three.
     """
     others = [name for name in head.expressions if name != NEUTRAL]
     if len(others) < 2:

@@ -39,7 +39,8 @@ class Ran:
     """A command from its start to its end.
 
     Attributes:
-        seconds: altogether. cpu: of all its threads together.
+        seconds: altogether.
+        cpu: of all its threads together.
         memory: (N, 2) seconds since the start, and MiB that it held then.
     """
 

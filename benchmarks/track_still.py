@@ -24,7 +24,9 @@ class Jitter:
     """Root mean square second difference over still frames.
 
     Attributes:
-        rotation: degrees. translation: percent of the head's distance. nose: px.
+        rotation: degrees.
+        translation: percent of the head's distance.
+        nose: px.
         frames: how many were looked at.
     """
 

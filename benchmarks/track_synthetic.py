@@ -1,4 +1,7 @@
-"""Tracking against the truth, under P02's changes. Run: python -m benchmarks.track_synthetic"""
+"""Tracking against the truth, under [Pighin 2002]'s changes.
+
+Run: python -m benchmarks.track_synthetic
+"""
 
 from __future__ import annotations
 
@@ -128,7 +131,8 @@ INTRO = (
     "{who} in three expressions ({shown}), blended uniformly over the whole face, {count} frames "
     "of 300x300 px. The head turns by 25 degrees to either side and moves along all axes. Three "
     "regions are tracked, the start is the face detector's, the focal length is known. Head "
-    "tracked by the model that it was drawn with, as in P02 sec. 6.2. Weights: mean absolute "
+    "tracked by the model that it was drawn with, as in [Pighin 2002] sec. 6.2. Weights: "
+    "mean absolute "
     "error over all expressions of the model. Shape: mean distance of the face's vertices, which "
     "tells mixtures that look alike from others. Hands cover a quarter of the face in the mean; "
     "{cover}."

@@ -188,7 +188,9 @@ def mutate_file(path: Path, others: list[bytes], rng: Rng) -> str:
 
     Args:
         others: contents of files of other kinds, to be swapped with.
-    Returns: what was done.
+
+    Returns:
+        what was done.
     """
     data = path.read_bytes()
     kind = rng.integers(12)

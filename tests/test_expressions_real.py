@@ -107,7 +107,8 @@ class Steps:
     """Colour steps between neighbouring pixels of one picture, 0 to 255.
 
     Attributes:
-        everywhere: two arrays, down and across. border: pairs on a border of regions of the face.
+        everywhere: two arrays, down and across.
+        border: pairs on a border of regions of the face.
         within: pairs on the head and on no border.
     """
 

@@ -50,7 +50,9 @@ class Case:
     """A command and what came of its kills.
 
     Attributes:
-        name: of the command. arguments: but for the output. output: within a folder of its own.
+        name: of the command.
+        arguments: but for the output.
+        output: within a folder of its own.
         seconds: that an undisturbed run takes.
         whole: digests of results that runs wrote to their end.
         told: how often what happened.

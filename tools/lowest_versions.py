@@ -19,7 +19,9 @@ def lowest_versions(pyproject: str) -> list[str]:
 
     Args:
         pyproject: the file's text.
-    Raises: ValueError: a dependency without a lower bound, or written otherwise.
+
+    Raises:
+        ValueError: a dependency without a lower bound, or written otherwise.
     """
     project = tomllib.loads(pyproject)["project"]
     asked = [*project["dependencies"]]

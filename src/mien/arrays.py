@@ -47,7 +47,9 @@ def check_array(
         shape: one entry an axis; None accepts any length.
         dtype: the type of the result.
         finite: refuse NaN and infinity.
-    Raises: InputError: the shape differs, the type does not convert, a number is not finite.
+
+    Raises:
+        InputError: the shape differs, the type does not convert, a number is not finite.
     """
     wanted = "(" + ", ".join("any" if length is None else str(length) for length in shape) + ")"
     try:

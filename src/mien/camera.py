@@ -17,12 +17,15 @@ class Camera:
     of the image, centre of the first pixel at (0.5, 0.5).
 
     Attributes:
-        width, height: image size in px.
+        width: image size in px.
+        height: image size in px.
         focal_px: focal length in px.
         R_cam_head: (3, 3) rotation from head space to camera space.
         t_cam_head: (3,) mm, position of the head's origin in camera space.
         principal_px: (2,) px, where the optical axis meets the image; its centre unless known.
-    Raises: InputError: a size or focal length that is not positive, a matrix that is no rotation.
+
+    Raises:
+        InputError: a size or focal length that is not positive, a matrix that is no rotation.
     """
 
     width: int

@@ -11,6 +11,7 @@ _BYTE = 0xDC00  # where Python puts the bytes of a file's name that are no text
 
 def escaped(text: str) -> str:
     """Text that any file in UTF-8 can hold: bytes that are no text, and what steers terminals,
+
     are written as \\xNN.
     """
 

@@ -30,7 +30,9 @@ def check_expression_folders(folders: Iterable[Path]) -> None:
     A name is a file's on every system: no control characters, none of / \\ : * ? " < > |, no dot
     or space at either end, no device of Windows', MAX_NAME_BYTES at most. It is no texture's of the
     neutral face, and unlike every other one, however letters are written.
-    Raises: InputError: names the folder.
+
+    Raises:
+        InputError: names the folder.
     """
     taken: dict[str, Path] = {}
     for folder in sorted(folders):

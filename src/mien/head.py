@@ -33,7 +33,9 @@ class FittedView:
         distrusted: why, by point name, for every point that was seen and not used.
         gains: (3,) what its colours were multiplied by on the way into the texture, so that photos
             of different exposure agree.
-    Raises: InputError: an error that is negative or not finite, a negative count.
+
+    Raises:
+        InputError: an error that is negative or not finite, a negative count.
     """
 
     photo: str
@@ -94,14 +96,16 @@ class Head:
         unit_names: the face units this head has (ARKit's 52 names).
         unit_offsets: (K, V, 3) mm, added to the neutral vertices at weight 1.
         textures: (h, w, 3) sRGB by name. "atlas" lies in the mesh's own texture coordinates;
-            "cylinder" is P02's map (sec. 5.2.1).
-        regions: (V,) in [0, 1], soft masks of the regions of the face that can be controlled
-            by themselves, by name; empty takes the generic head's (rig.regions).
+            "cylinder" is [Pighin 2002]'s map (sec. 5.2.1).
+        regions: (V,) in [0, 1], soft masks of the regions of the face that can be controlled by
+            themselves, by name; empty takes the generic head's (rig.regions).
         shading: coefficients of the brightness of "eyes" and "teeth" by how far lids and lips are
-            open (P02 sec. 5.2.4).
+            open ([Pighin 2002] sec. 5.2.4).
         left_out: why, by photo name, for every photo that did not fit.
         generator: the program that made it.
-    Raises: InputError: shapes that do not fit, no neutral, a name that makes no file name.
+
+    Raises:
+        InputError: shapes that do not fit, no neutral, a name that makes no file name.
     """
 
     subject: str

@@ -21,7 +21,9 @@ class Mesh:
         uv_triangles: (F, 3) indices into uvs.
         part: (F,) index into part_names for every triangle.
         part_names: for example ("skin", "left_eyeball", ...).
-    Raises: InputError: shapes that do not fit, an index out of range.
+
+    Raises:
+        InputError: shapes that do not fit, an index out of range.
     """
 
     vertices: Float[Array, "v 3"]

@@ -80,7 +80,7 @@ def test_mirrored_landmarks_give_mirrored_points(layout: FeatureLayout) -> None:
 
 
 def test_every_set_is_reached_from_every_other(layout: FeatureLayout) -> None:
-    """Z06 section 10: points that sets share carry motion from level to level."""
+    """[Zhang 2006] section 10: points that sets share carry motion from level to level."""
     assert len(layout.sets[0][0]) == 134
     for level in (1, 2):
         held = np.unique(np.concatenate(layout.sets[level]))

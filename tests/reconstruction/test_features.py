@@ -177,7 +177,7 @@ def test_rematching_leaves_named_points_and_single_curves_alone() -> None:
 
 
 def test_cameras_start_without_the_curves_where_points_suffice() -> None:
-    """P02 sec. 5.1.3: curves refine the shape; arc length would falsify the cameras."""
+    """[Pighin 2002] sec. 5.1.3: curves refine the shape; arc length would falsify the cameras."""
     few, many = list(GENERIC.points)[:4], list(GENERIC.points)[:ENOUGH_NAMED]
     views = [photographed(PERSON, FRONT, points=p, curves=["hairline"]) for p in (few, many)]
     features = gather_features(views, GENERIC)

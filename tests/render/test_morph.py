@@ -49,7 +49,8 @@ def regions(rng: np.random.Generator, low: float, high: float) -> Array:
 def passes(posed: PosedFace, camera: Camera, factor: int) -> Array:
     """Slow and obvious: one float picture a texture, weighted, summed; then pixels; then 0 to 255.
 
-    Returns: (H, W, 4), not rounded; NaN where a pixel is not wholly covered.
+    Returns:
+        (H, W, 4), not rounded; NaN where a pixel is not wholly covered.
     """
     mesh = MESH.with_vertices(posed.vertices)
     raster = rasterize_mesh(mesh, camera.resized(factor))

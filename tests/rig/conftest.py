@@ -57,7 +57,9 @@ def both(name: str, weight: float = 1.0) -> dict[str, float]:
 @pytest.fixture(scope="session", params=["generic", "person 0", "person 1", "James"])
 def rigged(request: pytest.FixtureRequest) -> Rigged:
     """The generic head, two persons whose skin is a little rough, as fitted skin is, and a man
-    fitted to the marks on his photos."""
+
+    fitted to the marks on his photos.
+    """
     generic = load_generic_head()
     vertices = np.array(generic.mesh.vertices)
     if request.param == "James":

@@ -1,7 +1,7 @@
 """Pictures of a sequence follow its geometry: no step of theirs is larger than that asks for.
 
-Each picture is made on its own (Z06 section 14.1). A picture that jumped somewhere would differ
-from the one before by the same amount however short the time between them; one that follows
+Each picture is made on its own ([Zhang 2006] section 14.1). A picture that jumped somewhere would
+differ from the one before by the same amount however short the time between them; one that follows
 differs by half when the steps of the geometry are half as long.
 """
 

@@ -47,7 +47,8 @@ _TALL = (0.27, 0.22, 1.0)
 def pack(source: MakeHuman, head: HeadCut) -> tuple[Float[Array, "u 2"], Int[Array, "q 4"]]:
     """Texture coordinates of the head.
 
-    Returns: (U, 2) in [0, 1], and for each quad its (Q, 4) indices into them.
+    Returns:
+        (U, 2) in [0, 1], and for each quad its (Q, 4) indices into them.
     """
     uvs, uv_quads = [], np.empty_like(head.uv_quads)
     count = 0

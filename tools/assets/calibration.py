@@ -22,7 +22,8 @@ class Surface:
     """Points spread over a surface with their normals.
 
     Attributes:
-        points, normals: (N, 3) mm; unit.
+        points: (N, 3) mm; unit.
+        normals: (N, 3) mm; unit.
     """
 
     points: Float[Array, "n 3"]

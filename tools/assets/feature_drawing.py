@@ -123,4 +123,4 @@ SETS: dict[int, dict[str, str]] = {
     },
 }
 RIGID = "hairline nose_root SIDE_hairline SIDE_eye_inner"
-"""What moves with the head alone: Z06 section 12.1, and the root of the nose."""
+"""What moves with the head alone: [Zhang 2006] section 12.1, and the root of the nose."""

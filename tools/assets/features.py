@@ -62,7 +62,8 @@ _NOSE_RIDGE_COUNT = 5
 def find_features(head: HeadCut) -> tuple[dict[str, int], dict[str, tuple[int, ...]]]:
     """The 13 points and the polylines.
 
-    Returns: vertex by name; vertices along each curve by name.
+    Returns:
+        vertex by name; vertices along each curve by name.
     """
     polylines: dict[str, tuple[int, ...]] = {}
     for name, (count, path) in _PAIRED.items():
@@ -93,7 +94,7 @@ def brow_mask(head: HeadCut, polylines: dict[str, tuple[int, ...]]) -> Float[Arr
 
 
 def _points(head: HeadCut, polylines: dict[str, tuple[int, ...]]) -> dict[str, int]:
-    """P02's 13 points: ends of curves and extremal vertices."""
+    """[Pighin 2002]'s 13 points: ends of curves and extremal vertices."""
     left = {
         "eye_outer": polylines["left_upper_eyelid"][-1],
         "eye_inner": polylines["left_upper_eyelid"][0],

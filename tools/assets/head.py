@@ -40,7 +40,8 @@ class HeadCut:
 
     Attributes:
         source: (V,) hm08 vertex under every vertex of the head; parts follow each other.
-        quads, uv_quads: (Q, 4) indices into the head's vertices and into hm08's texture vertices.
+        quads: (Q, 4) indices into the head's vertices and into hm08's texture vertices.
+        uv_quads: as `quads`.
         quad_part: (Q,) index into PART_NAMES.
         mirror: (V,) left-right partner.
         vertices: (V, 3) mm, head space: the mean shape.

@@ -57,7 +57,8 @@ def sample_heads(
     those made for asymmetry move little. Gender, age, ancestry, weight and muscle mix
     MakeHuman's macro targets.
 
-    Returns: (count, V, 3), each aligned so that the eyes' centres stay where they are.
+    Returns:
+        (count, V, 3), each aligned so that the eyes' centres stay where they are.
     """
     offsets = _macro_offsets(source, head, count, rng)
     for folder, spread in _SPREADS.items():

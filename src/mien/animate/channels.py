@@ -56,7 +56,9 @@ def head_rotation(yaw: float, pitch: float, roll: float) -> Float[Array, "3 3"]:
     """Rotation of head space as `mien render` composes it: yaw first, then pitch, then roll.
 
     Args:
-        yaw, pitch, roll: radians; to the subject's left, down, to the subject's right shoulder.
+        yaw: radians; to the subject's left, down, to the subject's right shoulder.
+        pitch: radians; to the subject's left, down, to the subject's right shoulder.
+        roll: radians; to the subject's left, down, to the subject's right shoulder.
     """
     from scipy.spatial.transform import Rotation
 

@@ -31,7 +31,9 @@ class Curve:
         slopes_in: (K,) value a second with which a cubic arrives at the key; NaN: automatic.
         slopes_out: (K,) with which it leaves.
         slopes: (2, K) both with the automatic ones filled in; made, not given.
-    Raises: InputError: no key, a time that does not rise, NaN, an unknown interpolation.
+
+    Raises:
+        InputError: no key, a time that does not rise, NaN, an unknown interpolation.
     """
 
     times: Float[Array, " k"]
@@ -134,7 +136,9 @@ def _auto_slopes(times: Array, values: Array, holds: Array) -> Array:
 
     Between two rises the weighted harmonic mean of their steepnesses, which is at most three times
     the smaller one and so keeps every piece monotone.
-    Source: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5(2), 1984, eq. (5).
+
+    Source:
+        Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5(2), 1984, eq. (5).
     """
     slopes = np.zeros(len(times))
     if len(times) < 3:

@@ -26,7 +26,8 @@ def rest_camera(track: Track) -> Camera:
     Seen through `perform.moved_camera(rest_camera(track), moment)`, a track's moments are where
     they were in the video.
 
-    Raises: InputError: no frame with a face.
+    Raises:
+        InputError: no frame with a face.
     """
     places = [state.t_cam_head for _, state in _found(track)]
     middle = np.median(places, axis=0)
@@ -39,7 +40,8 @@ def track_timeline(track: Track) -> Timeline:
     Times count from the first frame. Lost frames are bridged by their neighbours. The head's pose
     is relative to rest_camera's head. What stays at 0 has no track.
 
-    Raises: InputError: no frame with a face.
+    Raises:
+        InputError: no frame with a face.
     """
     found = _found(track)
     times = np.array([frame.time for frame, _ in found]) - track.frames[0].time
@@ -62,7 +64,8 @@ def track_timeline(track: Track) -> Timeline:
 def track_moments(track: Track) -> Iterator[Moment]:
     """Face and head at each of the track's frames, lost ones too; times count from the first.
 
-    Raises: InputError: no frame with a face.
+    Raises:
+        InputError: no frame with a face.
     """
     times = np.array([frame.time for frame in track.frames])
     return track_timeline(track).moments_at(times - times[:1])

@@ -22,10 +22,14 @@ class Blink:
     Attributes:
         period: seconds from one blink to the next, on average.
         jitter: share of the period by which each blink comes earlier or later, 0 to 0.9.
-        closing, closed, opening: seconds that the lids take to fall, stay and rise.
+        closing: seconds that the lids take to fall, stay and rise.
+        closed: seconds that the lids take to fall, stay and rise.
+        opening: seconds that the lids take to fall, stay and rise.
         amount: how far they fall; 1 closes them.
         seed: another one gives other times.
-    Raises: InputError: a duration that is none, blinks that would overlap, a jitter out of range.
+
+    Raises:
+        InputError: a duration that is none, blinks that would overlap, a jitter out of range.
     """
 
     period: float = 4.0
@@ -67,11 +71,15 @@ class Breathing:
     """The head rises and falls a little, and never stands quite still.
 
     Attributes:
-        period: seconds a breath. jitter: share by which breaths differ in length.
-        rise: mm by which breathing in lifts the head. tip: radians by which it tips it back.
+        period: seconds a breath.
+        jitter: share by which breaths differ in length.
+        rise: mm by which breathing in lifts the head.
+        tip: radians by which it tips it back.
         sway: radians of slow turning and leaning, slower than the breath.
         seed: another one gives another motion.
-    Raises: InputError: a period below MIN_PERIOD, a jitter out of range, NaN.
+
+    Raises:
+        InputError: a period below MIN_PERIOD, a jitter out of range, NaN.
     """
 
     period: float = 4.2

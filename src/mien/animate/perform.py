@@ -19,7 +19,9 @@ def frames_of(timeline: Timeline, fps: float | None = None) -> Float[Array, " n"
 
     Args:
         fps: frames a second; the timeline's own unless given.
-    Raises: InputError: a rate out of range, more than MAX_FRAMES.
+
+    Raises:
+        InputError: a rate out of range, more than MAX_FRAMES.
     """
     rate = check_positive("fps", timeline.fps if fps is None else fps)
     if rate > MAX_FPS:

@@ -34,10 +34,14 @@ class Placement:
     """A clip at a place in time.
 
     Attributes:
-        clip: its name. at: seconds where it starts.
-        speed: 2 plays it in half the time. weight: factor on its values.
+        clip: its name.
+        at: seconds where it starts.
+        speed: 2 plays it in half the time.
+        weight: factor on its values.
         repeats: how often it plays, one after the other; may be a fraction.
-    Raises: InputError: a speed or a number of repeats of 0 or less, NaN.
+
+    Raises:
+        InputError: a speed or a number of repeats of 0 or less, NaN.
     """
 
     clip: str
@@ -57,7 +61,9 @@ class Clip:
     """A motion with a name, to be placed as often as one likes; nothing outside of its length.
 
     Attributes:
-        duration: seconds. tracks: from 0 to there. placements: of other clips in this one.
+        duration: seconds.
+        tracks: from 0 to there.
+        placements: of other clips in this one.
     """
 
     duration: float
@@ -74,8 +80,11 @@ class Layer:
     """Motion that is added to everything below it.
 
     Attributes:
-        name: for people. weight: factor on the layer, over time.
-        tracks, placements: as a timeline's. generator: makes further tracks.
+        name: for people.
+        weight: factor on the layer, over time.
+        tracks: as a timeline's.
+        placements: as a timeline's.
+        generator: makes further tracks.
     """
 
     name: str = ""
@@ -93,8 +102,10 @@ class Moment:
     """Face and head at one time: a vertex x in head space is seen at rotation x + translation.
 
     Attributes:
-        time: seconds. state: what the face does.
-        rotation: (3, 3). translation: (3,) mm; the pivot's part is in it.
+        time: seconds.
+        state: what the face does.
+        rotation: (3, 3).
+        translation: (3,) mm; the pivot's part is in it.
     """
 
     time: float
@@ -108,15 +119,19 @@ class Timeline:
     """A performance: tracks + placed clips + layers, added channel by channel.
 
     Attributes:
-        duration: seconds. fps: frames a second that it was made for.
+        duration: seconds.
+        fps: frames a second that it was made for.
         size: width and height in px of its pictures, where it says so.
         pivot: (3,) mm, head space: the point about which the head turns.
         tracks: by channel; one that is not there is at 0.
-        placements: of clips, added to the tracks. clips: by name.
+        placements: of clips, added to the tracks.
+        clips: by name.
         layers: added on top.
         notes: what whoever read it adapted, for the user.
-    Raises: InputError: a duration, rate or size of 0 or less, or beyond mien.limits; an unknown
-        clip, one that contains itself, a channel that is none.
+
+    Raises:
+        InputError: a duration, rate or size of 0 or less, or beyond mien.limits; an unknown clip,
+            one that contains itself, a channel that is none.
     """
 
     duration: float

@@ -32,7 +32,9 @@ _READERS: dict[type, Callable[[object, str], Any]] = {
 def read_data(path: Path, format_name: str, build: Callable[[dict[str, Any]], _Kind]) -> _Kind:
     """What `build` makes of the document in a file of this format.
 
-    Raises: InputError: the file cannot be read. FileFormatError: not such a file; says where.
+    Raises:
+        InputError: the file cannot be read.
+        FileFormatError: not such a file; says where.
     """
     document = read_json(path)
     try:

@@ -13,7 +13,8 @@ MODEL_NAME = "face_landmarker.task"
 def detector_model_path() -> Path:
     """The MediaPipe face landmarker's model that ships with mien (Apache-2.0).
 
-    Raises: FileFormatError: the installation is incomplete.
+    Raises:
+        FileFormatError: the installation is incomplete.
     """
     path = Path(str(files("mien.assets"))) / "data" / MODEL_NAME
     if not path.is_file():

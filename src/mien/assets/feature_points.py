@@ -24,21 +24,24 @@ FORMAT = "mien feature points"
 
 @dataclass(frozen=True)
 class FeatureLayout:
-    """What feature points there are on a face (Z06 section 5.1, Fig. 2a) and what is drawn on them.
+    """What feature points there are on a face and what is drawn on them.
 
     Attributes:
         name: "zhang134".
         names: of the points; right and left are the subject's.
-        sets: of each level, the indices of each set's points (Z06 section 10, Fig. 4).
+        sets: of each level, the indices of each set's points ([Zhang 2006] section 10, Fig. 4).
         set_names: likewise.
         mirror: (n,) each point's counterpart on the other side, its own on the midline.
-        template: (n, 2) on a mean face from the front, mouth open; its width is 1, y down, x to
-            the subject's left.
-        triangles: (T, 3) over the points and, after them, those of `frame`; none is folded over
-            on the template.
+        template: (n, 2) on a mean face from the front, mouth open; its width is 1, y down, x to the
+            subject's left.
+        triangles: (T, 3) over the points and, after them, those of `frame`; none is folded over on
+            the template.
         mixes: (n, 478) each point from the detector's landmarks; rows sum to 1.
-        rigid: points that move with the head alone (Z06 section 12.1).
+        rigid: points that move with the head alone ([Zhang 2006] section 12.1).
         surround: (k, 2) the points of `frame` on the template.
+
+    Source:
+        [Zhang 2006] section 5.1, Fig. 2a.
     """
 
     name: str
@@ -64,7 +67,8 @@ class FeatureLayout:
     def index(self, name: str) -> int:
         """The index of a point.
 
-        Raises: InputError: no point has this name; lists those that are close.
+        Raises:
+            InputError: no point has this name; lists those that are close.
         """
         if name not in self._indices:
             close = difflib.get_close_matches(name, self.names, n=3)
@@ -77,7 +81,8 @@ class FeatureLayout:
     def from_landmarks(self, landmarks: Float[Array, "478 2"]) -> Float[Array, "n 2"]:
         """The points on a face whose landmarks the detector found, in the same pixels.
 
-        Raises: InputError: shape, NaN.
+        Raises:
+            InputError: shape, NaN.
         """
         points: Array = self.mixes @ check_array("landmarks", landmarks, (LANDMARK_COUNT, 2))
         return points
@@ -85,8 +90,12 @@ class FeatureLayout:
     def frame(self, points: Float[Array, "n 2"]) -> Float[Array, "k 2"]:
         """Points around the face that follow the head and no expression, in the same pixels.
 
-        Raises: InputError: shape, NaN. EstimationError: rigid points in one place.
-        Source: Z06 section 12, eq. (8) and (9), over the rigid points.
+        Raises:
+            InputError: shape, NaN.
+            EstimationError: rigid points in one place.
+
+        Source:
+            [Zhang 2006] section 12, eq. (8) and (9), over the rigid points.
         """
         points = check_array("points", points, (len(self.names), 2))
         motion = estimate_planar_motion(self.template[self.rigid], points[self.rigid])
@@ -96,7 +105,9 @@ class FeatureLayout:
 def load_feature_layout(path: str | Path | None = None) -> FeatureLayout:
     """The 134 points that ship with mien, or those of a file of the same kind.
 
-    Raises: InputError: the file cannot be read. FileFormatError: it holds no layout; says where.
+    Raises:
+        InputError: the file cannot be read.
+        FileFormatError: it holds no layout; says where.
     """
     shipped = str(files("mien.assets") / "data" / "zhang134.json")
     return read_data(Path(path or shipped), FORMAT, _layout)

@@ -20,8 +20,8 @@ class IdentityBasis:
     """How heads differ from the generic one: vertices = generic + coefficients . components.
 
     Attributes:
-        components: (K, V, 3) mm, scaled so that a person's coefficients are independent with mean
-            0 and standard deviation 1: the sum of their squares is a prior.
+        components: (K, V, 3) mm, scaled so that a person's coefficients are independent with mean 0
+            and standard deviation 1: the sum of their squares is a prior.
     """
 
     components: Float[Array, "k v 3"]
@@ -29,7 +29,8 @@ class IdentityBasis:
     def offsets(self, coefficients: Float[Array, " k"]) -> Float[Array, "v 3"]:
         """(V, 3) mm to add to the generic head's vertices.
 
-        Raises: InputError: more coefficients than components, or not finite; fewer are fine.
+        Raises:
+            InputError: more coefficients than components, or not finite; fewer are fine.
         """
         coefficients = check_array("coefficients", coefficients, (None,))
         if len(coefficients) > len(self.components):
@@ -51,7 +52,7 @@ class GenericHead:
         unit_offsets: (52, V, 3) mm, added to the vertices at weight 1.
         identity: how heads differ.
         regions: soft masks by name, (V,) in [0, 1].
-        points: P02's 13 points: vertex index by name.
+        points: [Pighin 2002]'s 13 points: vertex index by name.
         polylines: vertex indices along each feature curve, by name.
         landmark_triangles: (478,) index of the triangle under each detector landmark.
         landmark_barycentrics: (478, 3) place in it.
@@ -81,7 +82,8 @@ class GenericHead:
     def vertex_of(self, name: str) -> int:
         """The vertex of one of the 13 points or of POLYLINE.INDEX.
 
-        Raises: InputError: no such name; lists those that are close.
+        Raises:
+            InputError: no such name; lists those that are close.
         """
         if name in self.points:
             return self.points[name]
@@ -110,7 +112,8 @@ class GenericHead:
 def load_generic_head() -> GenericHead:
     """The generic head that ships with mien, read once and kept.
 
-    Raises: FileFormatError: the installation is incomplete.
+    Raises:
+        FileFormatError: the installation is incomplete.
     """
     path = Path(str(files("mien.assets"))) / "data" / "generic_head.npz"
     if not path.is_file():

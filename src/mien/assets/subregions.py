@@ -45,16 +45,18 @@ class SubregionDrawing:
 
 @dataclass(frozen=True)
 class Subregions:
-    """The subregions on a person's standard image (Z06 section 5.3, Fig. 2b).
+    """The subregions on a person's standard image ([Zhang 2006] section 5.3, Fig. 2b).
 
     Attributes:
         names: R of them, teeth last.
-        fades: (h, w, R) float32, each pixel's shares; they sum to 1 inside of the face and fall
-            to 0 around it.
+        fades: (h, w, R) float32, each pixel's shares; they sum to 1 inside of the face and fall to
+            0 around it.
         members: of each, the indices of the feature points within it or on its boundary, and of
             others that tell about it: lids follow the pupil.
-    Raises: InputError: two of one name, fades for another number of them, below 0 or together
-        above 1, one without a point that tells about it.
+
+    Raises:
+        InputError: two of one name, fades for another number of them, below 0 or together above 1,
+            one without a point that tells about it.
     """
 
     names: tuple[str, ...]
@@ -93,8 +95,12 @@ def default_subregions(
         standard_points: (n, 2) px of the standard image.
         size: its width and height.
         drawing: another one than mien's own.
-    Raises: InputError: shapes, NaN, no pixels.
-    Source: Z06 sections 5.3 and 7, eq. (7), Fig. 3b.
+
+    Raises:
+        InputError: shapes, NaN, no pixels.
+
+    Source:
+        [Zhang 2006] sections 5.3 and 7, eq. (7), Fig. 3b.
     """
     points = check_array("standard_points", standard_points, (len(layout.names), 2))
     if min(size) < 1:
@@ -180,7 +186,9 @@ def load_subregion_drawing(
 ) -> SubregionDrawing:
     """The 14 subregions that ship with mien, or those of a file of the same kind.
 
-    Raises: InputError: the file cannot be read. FileFormatError: no subregions over this layout.
+    Raises:
+        InputError: the file cannot be read.
+        FileFormatError: no subregions over this layout.
     """
     shipped = str(files("mien.assets") / "data" / "zhang134_subregions.json")
     return read_data(Path(path or shipped), FORMAT, lambda document: _drawing(document, layout))

@@ -30,7 +30,8 @@ class AnnotationNames:
     """What may be marked.
 
     Attributes:
-        points: names of single points: P02's 13, and every vertex of a polyline (`left_jaw.3`).
+        points: names of single points: [Pighin 2002]'s 13, and every vertex of a polyline
+            (`left_jaw.3`).
         curves: names of polylines.
     """
 
@@ -96,7 +97,8 @@ def load_annotations(path: str | Path, photo: Photo, *, names: AnnotationNames) 
 def save_annotations(path: str | Path, photo: Photo, annotations: Annotations) -> None:
     """Write the marks in px of the photo as loaded; an old file stays until the new one is whole.
 
-    Raises: InputError: the file cannot be written.
+    Raises:
+        InputError: the file cannot be written.
     """
     path = Path(path)
     data = {

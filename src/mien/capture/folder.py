@@ -23,7 +23,8 @@ _DOCUMENTS = frozenset({"COPYING", "CREDITS", "LICENCE", "LICENSE", "NOTICE", "R
 def photo_files(source: Path) -> dict[str, list[Path]]:
     """Photos by expression, `neutral` first, each in natural order.
 
-    Raises: InputError: as kind_of_source; a folder without photos: says what is there instead.
+    Raises:
+        InputError: as kind_of_source; a folder without photos: says what is there instead.
     """
     if kind_of_source(source) != "folder":
         return {NEUTRAL: [source]}

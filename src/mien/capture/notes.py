@@ -13,6 +13,7 @@ _OWN = "left out"
 
 def gathered_notes(notes: Iterable[tuple[str, str]]) -> list[str]:
     """`NAME: NOTE` for each; where notes differ in numbers at most, `FIRST and 11 more: NOTE`,
+
     and up to three names in full.
 
     Args:

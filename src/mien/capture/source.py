@@ -96,12 +96,13 @@ def load_capture(
     Args:
         source: a folder of photos, a folder of one folder an expression, a photo or a video.
         max_side: larger photos are reduced to this many px on the longer side.
-        face: which face to take where there are several, from left to right from 1; None takes
-            the largest.
+        face: which face to take where there are several, from left to right from 1; None takes the
+            largest.
         frames: how many frames of a video to use at most for the face at rest.
         expressions: how many other expressions of a video at most; None takes those that differ.
         names: what annotations may name; None takes the generic head's names.
         progress: told after every photo or frame.
+
     Raises:
         InputError: there is nothing at `source`, or no photo in it.
         FileFormatError: a photo, a video or an annotation file is damaged.

@@ -30,7 +30,8 @@ def kind_of_source(source: str | Path) -> SourceKind:
     A picture that moves (a GIF, an animated PNG) is a video. What cannot be told is what its name
     says: whoever reads it will say what is wrong with it.
 
-    Raises: InputError: nothing given, nothing there, a folder that mien made, a pipe, a device.
+    Raises:
+        InputError: nothing given, nothing there, a folder that mien made, a pipe, a device.
         FileFormatError: an empty file, one that is neither a photo nor a video.
     """
     path = named_path("source", source, EXPECTED)

@@ -65,7 +65,8 @@ def build(
     ],
     output: Output,
     adjust: Annotated[
-        bool, typer.Option(help="Adjust all cameras and points jointly after P02's five steps.")
+        bool,
+        typer.Option(help="Bundle adjustment after the five linear steps of [Pighin 2002]."),
     ] = True,
     dense: Annotated[
         bool,
@@ -75,7 +76,7 @@ def build(
         Curves, typer.Option(help="How drawn curves become points in the second photo and on.")
     ] = "epipolar",
     kernel: Annotated[
-        Kernel, typer.Option(help="Radial basis of the deformation; the first is P02's.")
+        Kernel, typer.Option(help="Radial basis of the deformation; the first is [Pighin 2002]'s.")
     ] = "exponential",
     fill: Annotated[
         FillChoice, typer.Option(help="How texture that no photo shows is filled.")

@@ -19,7 +19,8 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,3})?", re.ASCII | re.IG
 def check_given(arguments: Sequence[str]) -> None:
     """Refuse arguments that are empty, which as a path would mean the current folder, or hold NUL.
 
-    Raises: InputError: names the option, or the place among the arguments.
+    Raises:
+        InputError: names the option, or the place among the arguments.
     """
     for place, argument in enumerate(arguments):
         before = arguments[place - 1] if place else ""

@@ -25,7 +25,9 @@ def terminal_progress(quiet: bool, *, counted: Collection[str] = ()) -> Iterator
     Args:
         quiet: draw nothing.
         counted: stages whose steps are frames; it is said how many a second.
-    Yields: a function of (stage, done, total); total 0 means "unknown, still at it".
+
+    Yields:
+        a function of (stage, done, total); total 0 means "unknown, still at it".
     """
     if quiet:
         yield lambda stage, done, total: None

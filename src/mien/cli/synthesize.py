@@ -54,19 +54,21 @@ def synthesize(
     ] = None,
     paper: Annotated[
         bool,
-        typer.Option("--paper", help="As Z06 prints it; the options below still count when given."),
+        typer.Option(
+            "--paper", help="As [Zhang 2006] prints it; the options below still count when given."
+        ),
     ] = False,
     propagation: Annotated[
         Literal["closed-form", "printed"] | None,
-        typer.Option(help="All points from some: closed-form by default, printed is Z06's."),
+        typer.Option(help="All points from some: closed-form, or printed, [Zhang 2006]'s."),
     ] = None,
     distance_penalty: Annotated[
         float | None,
-        typer.Option(help="Prefer examples that are near: 0.05 by default, Z06 has 0."),
+        typer.Option(help="Prefer examples that are near: 0.05 by default, [Zhang 2006] has 0."),
     ] = None,
     slack: Annotated[
         float | None,
-        typer.Option(help="How far shares may fall below 0; 0 by default and in Z06."),
+        typer.Option(help="How far shares may fall below 0; 0 by default and in [Zhang 2006]."),
     ] = None,
     upper_face_as_one: Annotated[
         bool,

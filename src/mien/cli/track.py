@@ -143,7 +143,9 @@ def _check_together(
     """Refuse options that mean nothing together. Raises: InputError: names the first of them.
 
     Args:
-        beside_a_table, not_live, only_live: options by name, falsy where they were not given.
+        beside_a_table: options by name, falsy where they were not given.
+        not_live: options by name, falsy where they were not given.
+        only_live: options by name, falsy where they were not given.
     """
     for name in _given(not_live) if is_live else ():
         raise InputError(name, "a video that is not tracked live", video)

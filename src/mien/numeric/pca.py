@@ -49,9 +49,11 @@ def fit_pca(rows: Float[Array, "n d"], components: int, *, centred: bool = True)
     Args:
         rows: (N, D), N >= 1; 2 or more when centred.
         components: how many, at least 1; fewer come where the rows do not span so many.
-        centred: measure variation about the mean; otherwise about 0, so that the subspace
-            contains 0.
-    Raises: InputError: shape, NaN, too few rows, fewer than 1 component.
+        centred: measure variation about the mean; otherwise about 0, so that the subspace contains
+            0.
+
+    Raises:
+        InputError: shape, NaN, too few rows, fewer than 1 component.
     """
     rows = check_array("rows", rows, (None, None))
     if len(rows) < 1 + centred:

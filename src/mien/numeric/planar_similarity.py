@@ -20,9 +20,12 @@ class PlanarMotion:
     """(x, y) -> [[a, -b], [b, a]] (x, y) + (tx, ty), one or a batch of any shape.
 
     Attributes:
-        a, b: (...) scale times cosine and sine of the rotation.
+        a: (...) scale times cosine and sine of the rotation.
+        b: (...) scale times cosine and sine of the rotation.
         translation: (..., 2) px.
-    Source: Z06 eq. (8).
+
+    Source:
+        [Zhang 2006] eq. (8).
     """
 
     a: Float[Array, "*batch"]
@@ -52,10 +55,13 @@ def estimate_planar_motion(
     Args:
         source: (N, 2), N >= 2, not all in one place.
         target: (..., N, 2) the same points after the motion.
+
     Raises:
         InputError: shapes, NaN, fewer than two points.
         EstimationError: source or what a target shows of it lies in one place.
-    Source: Z06 sec. 12, eq. (8), (9).
+
+    Source:
+        [Zhang 2006] sec. 12, eq. (8), (9).
     """
     source = check_array("source", source, (None, 2))
     if len(source) < 2:

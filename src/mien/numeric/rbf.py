@@ -13,11 +13,11 @@ from mien.errors import EstimationError, InputError
 __all__ = ["PAPER_RADIUS", "Rbf", "fit_rbf"]
 
 PAPER_RADIUS = 64 * 25.4
-"""64 inches in mm: the radius of P02's kernel."""
+"""64 inches in mm: the radius of [Pighin 2002]'s kernel."""
 
 # Signs make every kernel conditionally positive definite, so that smoothing smooths. The
-# exponential is written less 1, which the side condition sum(c) = 0 cancels: with P02's radius
-# all its values lie near 1 and the constant would cost half the digits.
+# exponential is written less 1, which the side condition sum(c) = 0 cancels: with the radius of
+# [Pighin 2002] all its values lie near 1 and the constant would cost half the digits.
 KERNELS: dict[str, Callable[[Array], Array]] = {
     "exponential": lambda r: np.expm1(-r),
     "gaussian": lambda r: np.exp(-(r**2)),
@@ -38,7 +38,8 @@ class Rbf:
         coefficients: (N, D) the c_i.
         origin: (3,) and axes: (A, 3): the affine part's coordinates are axes @ (m - origin).
         affine: (1 + A, D) its constant and its slopes along the axes.
-        kernel: name. radius: what distances are divided by.
+        kernel: name.
+        radius: what distances are divided by.
     """
 
     centers: Float[Array, "n 3"]
@@ -76,15 +77,20 @@ def fit_rbf(
     directions that they do span.
 
     Args:
-        points: (N, 3), N >= 1. values: (N, D).
-        kernel: "exponential" (exp(-r/radius), P02's), "gaussian" (exp(-(r/radius)^2)),
+        points: (N, 3), N >= 1.
+        values: (N, D).
+        kernel: "exponential" (exp(-r/radius), [Pighin 2002]'s), "gaussian" (exp(-(r/radius)^2)),
             "biharmonic" (r), "triharmonic" (r^3) or "thin_plate" (r^2 log r).
-        radius: the unit of r; P02's 64 inches for "exponential", required for "gaussian", and
-            only a scale of the smoothing for the others (default 1).
+        radius: the unit of r; [Pighin 2002]'s 64 inches for "exponential", required for "gaussian",
+            and only a scale of the smoothing for the others (default 1).
         smoothing: added to the kernel matrix's diagonal, one number or (N,); 0 interpolates.
-    Raises: InputError: shapes, NaN, unknown kernel, negative smoothing. EstimationError: the
-        equations are singular in double precision.
-    Source: P02 sec. 5.1.2, eq. (3) with sum c_i = 0 and sum c_i m_i^T = 0.
+
+    Raises:
+        InputError: shapes, NaN, unknown kernel, negative smoothing.
+        EstimationError: the equations are singular in double precision.
+
+    Source:
+        [Pighin 2002] sec. 5.1.2, eq. (3) with sum c_i = 0 and sum c_i m_i^T = 0.
     """
     points = check_array("points", points, (None, 3))
     values = check_array("values", values, (len(points), None))

@@ -12,7 +12,8 @@ __all__ = ["angle_between", "cross_matrix", "rotation_from_vector", "rotation_to
 def rotation_from_vector(vector: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3 3"]:
     """Rodrigues' formula: rotation by |vector| radians about vector; exact at and near 0.
 
-    Source: P02 app. A, eq. (12).
+    Source:
+        [Pighin 2002] app. A, eq. (12).
     """
     from scipy.spatial.transform import Rotation
 
@@ -41,7 +42,7 @@ def angle_between(
 
 
 def cross_matrix(vector: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3 3"]:
-    """X(v), the matrix of the cross product: X(v) u = v x u. Source: P02 eq. (13)."""
+    """X(v), the matrix of the cross product: X(v) u = v x u. Source: [Pighin 2002] eq. (13)."""
     vector = np.asarray(vector, dtype=np.float64)
     matrix = np.zeros((*vector.shape, 3))
     x, y, z = np.moveaxis(vector, -1, 0)

@@ -18,14 +18,20 @@ def depths_below(
     """Depth of each point below the nearest place of a surface, and that place.
 
     Args:
-        points: (N, 3). vertices: (V, 3). triangles: (F, 3), counter-clockwise from outside.
+        points: (N, 3).
+        vertices: (V, 3).
+        triangles: (F, 3), counter-clockwise from outside.
         border: (V,) where the surface ends; nothing is below what touches its border.
         reach: points further from the surface than this count as outside.
-    Returns: (N,) depth, 0 where the point is outside; (N,) triangle of the nearest place, -1 where
-        the point is outside; (N, 3) its barycentric coordinates.
+
+    Returns:
+        (N,) depth, 0 where the point is outside; (N,) triangle of the nearest place, -1 where the
+        point is outside; (N, 3) its barycentric coordinates.
 
     The surface's normals at its vertices, interpolated, tell outside from inside.
-    Source: the nearest place is found as in Ericson, Real-Time Collision Detection, 5.1.5.
+
+    Source:
+        the nearest place is found as in Ericson, Real-Time Collision Detection, 5.1.5.
     """
     depth = np.zeros(len(points))
     place = np.full(len(points), -1, np.int64)

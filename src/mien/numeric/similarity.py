@@ -33,10 +33,16 @@ def estimate_similarity(
     """The similarity that takes source nearest to target in the least-squares sense.
 
     Args:
-        source, target: (N, 3) corresponding points, N >= 3, not all on one line.
+        source: (N, 3) corresponding points, N >= 3, not all on one line.
+        target: (N, 3) corresponding points, N >= 3, not all on one line.
         weights: (N,) >= 0; equal unless given.
-    Raises: InputError: shapes, NaN, negative weights. EstimationError: points on one line.
-    Source: Umeyama, Least-squares estimation of transformation parameters, PAMI 1991.
+
+    Raises:
+        InputError: shapes, NaN, negative weights.
+        EstimationError: points on one line.
+
+    Source:
+        Umeyama, Least-squares estimation of transformation parameters, PAMI 1991.
     """
     source = check_array("source", source, (None, 3))
     target = check_array("target", target, source.shape)

@@ -91,6 +91,7 @@ def animate_head(
     progress: Progress | None = None,
 ) -> Take:
     """Let a head perform a timeline; frames are made one at a time, and a run that is stopped
+
     leaves what was there.
 
     Args:
@@ -99,13 +100,17 @@ def animate_head(
             (MPEG-4); a name without one, or with a slash at its end, is a folder of pictures.
         fps: frames a second; the timeline's unless given.
         size: width and height of pictures, px; the timeline's unless given.
-        yaw, pitch: radians, how the head is turned before it moves; for pictures.
+        yaw: radians, how the head is turned before it moves; for pictures.
+        pitch: radians, how the head is turned before it moves; for pictures.
         background: sRGB. Unless given, pictures and .webm have alpha and an .mp4 a plain grey.
         read: files and folders beside the timeline that must stay as they are, such as the head's.
         progress: told the stage, the frames done and their total.
-    Raises: InputError: another suffix, a place that is read or cannot be written, a rate that a
-        .fap cannot say. FileFormatError: the timeline; what in it the head cannot do, by place;
-        more than MAX_FRAMES.
+
+    Raises:
+        InputError: another suffix, a place that is read or cannot be written, a rate that a .fap
+            cannot say.
+        FileFormatError: the timeline; what in it the head cannot do, by place; more than
+            MAX_FRAMES.
     """
     files = [] if isinstance(timeline, Timeline) else performance_files(timeline)
     write = _writer(path, [*files, *read])
@@ -135,7 +140,8 @@ def animate_head(
 def _hull_notes(job: _Job, name: str | Path) -> tuple[str, ...]:
     """What goes beyond the photographed expressions, and when farthest; before a frame is drawn.
 
-    Raises: FileFormatError: weights that no face may have, and when.
+    Raises:
+        FileFormatError: weights that no face may have, and when.
     """
     rig = job.renderer.rig
     farthest: dict[str, tuple[float, float, Mapping[str, float]]] = {}
@@ -164,7 +170,9 @@ def _beyond(weights: Mapping[str, float]) -> float:
 
 def _writer(path: str | Path, read: Iterable[str | Path]) -> Callable[[_Job, str | Path], int]:
     """By suffix. Raises: InputError: no such kind, a place that is read, a folder that holds other
-    things."""
+
+    things.
+    """
     from mien.io.files.frames import check_frames_place
 
     suffix = Path(path).suffix.lower()

@@ -71,7 +71,9 @@ class Build:
     """A head and how it came about, for those who want to look closer.
 
     Attributes:
-        head: the result. capture: the photos with landmarks and marks. fits: by expression.
+        head: the result.
+        capture: the photos with landmarks and marks.
+        fits: by expression.
         coverage: (H, W) summed weights of the photos in the neutral atlas.
         kept: notes on what the folder held that mien had not written.
     """
@@ -103,7 +105,10 @@ def build_head(
 ) -> Build:
     """A textured head from a folder of photos, one photo, or a video.
 
-    Raises: InputError, FileFormatError: the source. EstimationError: no photo fits.
+    Raises:
+        InputError: the source.
+        FileFormatError: the source.
+        EstimationError: no photo fits.
     """
     options = options or BuildOptions()
     tell = progress or (lambda stage, done, total: None)
@@ -135,6 +140,7 @@ def _fit_all(
     capture: Capture, generic: GenericHead, options: BuildOptions, tell: Progress
 ) -> tuple[Capture, dict[str, Fit | ExpressionFit], Float[Array, "52 v 3"]]:
     """Neutral by itself, then each expression with neutral and its face units as what is known;
+
     gives the units, too.
 
     An expression that cannot be fitted is left out of the capture, with a note.
@@ -224,8 +230,13 @@ def _expression(name: str, fit: Fit | ExpressionFit, generic: GenericHead) -> Ex
 def _with_textures(
     head: Head, capture: Capture, options: BuildOptions, tell: Progress
 ) -> tuple[Head, Float[Array, "h w"]]:
-    """The head with an atlas for every expression and neutral's cylinder (P02 sec. 5.2.2), and
-    neutral's coverage."""
+    """The head with an atlas for every expression and neutral's cylinder, and
+
+    neutral's coverage.
+
+    Source:
+        [Pighin 2002] sec. 5.2.2.
+    """
     stage, total, side = "Extracting textures", 3, options.texture_size
     tell(stage, 0, total)
     atlas = atlas_surface(head.mesh, width=side, height=side)
@@ -288,8 +299,9 @@ def build_head_folder(
 ) -> Build:
     """As build_head, and written as a head folder with its report and a turntable video.
 
-    Raises: as build_head; InputError: the place holds something that is no head folder, or cannot
-        be written. Whatever was there stays until the new folder is whole.
+    Raises:
+        as build_head; InputError: the place holds something that is no head folder, or cannot be
+            written. Whatever was there stays until the new folder is whole.
     """
     tell = progress or (lambda stage, done, total: None)
     check_head_place(folder, read=[source])

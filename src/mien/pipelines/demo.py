@@ -51,7 +51,8 @@ def demo_photos() -> Path:
 def run_demo(folder: Path, *, progress: Progress) -> Path:
     """Head, pictures, `.glb`, a performance and a page that shows them. Returns the page.
 
-    Raises: InputError: the folder holds something else or cannot be written.
+    Raises:
+        InputError: the folder holds something else or cannot be written.
     """
     check_folder_place(folder, replaces=_is_demo)
     with atomic_folder(folder, replaces=_is_demo, stay=()) as place:

@@ -40,7 +40,8 @@ def read_marks(file: Path, photo: Photo, layout: FeatureLayout) -> dict[str, Flo
     the same point, the later one counts. All are in px of the photo's file, turned upright. A file
     of points that mien does not know is left out; `mark_notes` tells.
 
-    Raises: FileFormatError: one of them is damaged; says where.
+    Raises:
+        FileFormatError: one of them is damaged; says where.
     """
     sources = mark_files(file)
     for_heads = [path for path in sources if _is_for_heads(path)]
@@ -59,7 +60,8 @@ def read_marks(file: Path, photo: Photo, layout: FeatureLayout) -> dict[str, Flo
 def mark_notes(file: Path, layout: FeatureLayout) -> list[str]:
     """Which files beside a photo hold points that mien does not know.
 
-    Raises: FileFormatError: one of them is damaged.
+    Raises:
+        FileFormatError: one of them is damaged.
     """
     notes = []
     for path in mark_files(file):

@@ -63,9 +63,11 @@ class ExampleRequest:
 
     Attributes:
         count: of examples at most.
-        neutral, standard: which picture is that; None: found.
-        include, exclude: pictures that are, and are not, to be examples; of a video, stretches of
-            frames as well, as `860-930`.
+        neutral: which picture is that; None: found.
+        standard: which picture is that; None: found.
+        include: pictures that are, and are not, to be examples; of a video, stretches of frames as
+            well, as `860-930`.
+        exclude: as `include`.
         face: which one, from left to right, in photos of several people.
         max_side: px; larger pictures are reduced to it.
         even: bring photos to one exposure.
@@ -120,8 +122,11 @@ def write_example_folder(
 ) -> GatheredExamples:
     """Examples of a person, in a folder, whole or not at all.
 
-    Raises: InputError, FileFormatError, EstimationError: before anything is written; as
-        `gather_examples`, a source that mien made, and a place that holds something else.
+    Raises:
+        InputError: before anything is written; as `gather_examples`, a source that mien made, and a
+            place that holds something else.
+        FileFormatError: as InputError.
+        EstimationError: as InputError.
     """
     tell = progress or (lambda stage, done, total: None)
     kind_of_source(source)
@@ -149,8 +154,11 @@ def gather_examples(
     Args:
         layout: of the points; mien's own unless given.
         progress: told the stage, steps done and their total.
-    Raises: InputError: no such source, a picture asked for that is not there. FileFormatError: a
-        damaged photo, video or file of marks. EstimationError: no picture shows a face.
+
+    Raises:
+        InputError: no such source, a picture asked for that is not there.
+        FileFormatError: a damaged photo, video or file of marks.
+        EstimationError: no picture shows a face.
     """
     request, layout = request or ExampleRequest(), layout or load_feature_layout()
     tell = progress or (lambda stage, done, total: None)

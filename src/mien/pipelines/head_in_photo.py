@@ -51,7 +51,9 @@ def find_head(head: Head, photo: Photo) -> HeadInPhoto:
     It is fitted to the photo's pixels, as in the frames of a video. Where none looks like them
     then, head and face are taken from the landmarks of the largest alone.
 
-    Raises: EstimationError: no face, one too small, none that the head fits. InputError: as `Rig`.
+    Raises:
+        EstimationError: no face, one too small, none that the head fits.
+        InputError: as `Rig`.
     """
     width, height = photo.size
     focal = photo.focal_prior_px or expected_focal(head, width, height).focal_px

@@ -50,7 +50,10 @@ def track_live_video(
         lag: seconds, as for track.smoothing.LiveFilter; nothing is smoothed unless given.
         seconds: of the source, after which it ends by itself.
         tell: told after every frame how it goes.
-    Raises: InputError, FileFormatError: before anything is tracked, what cannot be used.
+
+    Raises:
+        InputError: before anything is tracked, what cannot be used.
+        FileFormatError: before anything is tracked, what cannot be used.
         EstimationError: when all is written, a run whose frames are all lost.
     """
     if files is not None:

@@ -76,9 +76,12 @@ def synthesize_expression(
         head: of `points`, as for `target_from_points`.
         face: of `photo`, which one; the largest unless given.
         progress: told the stage, steps done and their total.
-    Raises: InputError: neither or both of points and photo, a place that cannot be written, points
-        that cannot be meant. FileFormatError, EstimationError: as `load_examples`,
-        `target_from_points`, `target_from_photo`.
+
+    Raises:
+        InputError: neither or both of points and photo, a place that cannot be written, points that
+            cannot be meant.
+        FileFormatError: as `load_examples`, `target_from_points`, `target_from_photo`.
+        EstimationError: as `load_examples`, `target_from_points`, `target_from_photo`.
     """
     tell = progress or (lambda stage, done, total: None)
     check_request(folder, points, photo, output, weights, save_points)

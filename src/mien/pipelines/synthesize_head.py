@@ -39,7 +39,8 @@ class HeadView:
     """From where a head is seen.
 
     Attributes:
-        yaw, pitch: radians, as docs/conventions.md says.
+        yaw: radians, as docs/conventions.md says.
+        pitch: radians, as docs/conventions.md says.
         size: width and height, px.
         background: sRGB; transparent unless given. Of a photo's head it is the photo.
     """
@@ -88,11 +89,15 @@ def synthesize_head(
         photo: of the same person, whose face has the expression; the head is drawn over it, where
             it is seen there.
         weights: W.json, which expressions made which subregion.
-        options, reach: as for `HeadSynthesizer`.
+        options: as for `HeadSynthesizer`.
+        reach: as for `HeadSynthesizer`.
         view: of `points`.
         progress: told the stage, steps done and their total.
-    Raises: InputError: neither or both of points and photo, a place that cannot be written, points
-        that cannot be meant. FileFormatError: as `load_head`, `read_points_json`.
+
+    Raises:
+        InputError: neither or both of points and photo, a place that cannot be written, points that
+            cannot be meant.
+        FileFormatError: as `load_head`, `read_points_json`.
         EstimationError: no face in the photo that this head fits.
     """
     tell = progress or (lambda stage, done, total: None)

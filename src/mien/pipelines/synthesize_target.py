@@ -67,10 +67,13 @@ def check_request(
 
     Args:
         folder: the examples or the head.
-        points, photo: files, of which one is given.
+        points: files, of which one is given.
+        photo: files, of which one is given.
         written: files that are to be written; the first is the picture.
-    Raises: InputError: neither or both, another kind of picture, a file over another one, a place
-        that cannot be written.
+
+    Raises:
+        InputError: neither or both, another kind of picture, a file over another one, a place that
+            cannot be written.
     """
     if (points is None) == (photo is None):
         expected = "--points FILE or --photo FILE: where the expression's points are"
@@ -92,8 +95,11 @@ def target_from_points(
         path: as for `read_points`.
         head: whether it is where the neutral photo has it, or moved: then the points tell how, and
             the picture moves with it. Of both, "auto" takes what makes the points likelier.
-    Raises: InputError: fewer than three points, points that look mirrored or lie far outside.
-        FileFormatError: as `read_points`. EstimationError: all points in one place.
+
+    Raises:
+        InputError: fewer than three points, points that look mirrored or lie far outside.
+        FileFormatError: as `read_points`.
+        EstimationError: all points in one place.
     """
     layout = synthesizer.examples.layout
     known, positions = read_points(path, layout)
@@ -123,8 +129,11 @@ def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int |
 
     Args:
         face: which one, from left to right from 1; None: the largest.
-    Raises: InputError, FileFormatError: no photo, or a damaged one; no such face. EstimationError:
-        no face in it, or one too small.
+
+    Raises:
+        InputError: no photo, or a damaged one; no such face.
+        FileFormatError: no photo, or a damaged one; no such face.
+        EstimationError: no face in it, or one too small.
     """
     from mien.capture.faces.detector import LandmarkDetector
 
@@ -149,7 +158,9 @@ def _guessed_outside(
     synthesizer: Synthesizer, points: Float[Array, "n 2"], size: tuple[int, int]
 ) -> Float[Array, "n 2"]:
     """Points beyond the edge of a picture from those inside, where enough is known of the person:
-    10 to 20 % nearer than the detector's guess where the edge cuts more than the chin (cap13)."""
+
+    10 to 20 % nearer than the detector's guess where the edge cuts more than the chin (cap13).
+    """
     known = np.flatnonzero(inside_picture(points, size))
     enough = len(synthesizer.examples.statistics) >= ENOUGH_STATISTICS
     if not enough or not LEAST_TELLING <= len(known) < len(points):

@@ -43,7 +43,8 @@ class Tracked:
     """What came of a video.
 
     Attributes:
-        frames: how many. counts: of these, by status.
+        frames: how many.
+        counts: of these, by status.
         resumed: of these, how many an earlier run had tracked.
         fps: frames tracked a second, decoding included; None where there was none to track.
         rms: grey levels, the median of the frames'; None where all were lost.
@@ -95,9 +96,12 @@ def track_video(
         resume: go on where an earlier run was stopped; from the start where there was none.
         max_side: px; larger pictures are tracked reduced to it.
         progress: told the stage, the frames done and their total.
-    Raises: InputError, FileFormatError: before any work is done, a video or a place that cannot be
-        used, a lens, a journal of another run. EstimationError: when all is written, a video
-        whose frames are all lost.
+
+    Raises:
+        InputError: before any work is done, a video or a place that cannot be used, a lens, a
+            journal of another run.
+        FileFormatError: as InputError.
+        EstimationError: when all is written, a video whose frames are all lost.
     """
     tell = progress or (lambda stage, done, total: None)
     clip = Video(named_path("video", video, "a video"))

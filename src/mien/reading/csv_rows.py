@@ -21,8 +21,10 @@ def read_rows(
     Args:
         expected: what kind of file it should be, for messages.
         separators: of cells; the one that the first line has most of.
-    Raises: InputError: the file cannot be read. FileFormatError: no CSV in UTF-8, an empty file, a
-        file that is too large.
+
+    Raises:
+        InputError: the file cannot be read.
+        FileFormatError: no CSV in UTF-8, an empty file, a file that is too large.
     """
     path, count = check_file(path, MAX_TABLE_BYTES), 0
     try:
@@ -55,7 +57,8 @@ def _lines(path: Path, stream: TextIO) -> Iterator[str]:
 def finite_number(path: str | Path, text: str, place: str) -> float:
     """The number in a cell.
 
-    Raises: FileFormatError: none, NaN, infinite, beyond any that is meant; names the place.
+    Raises:
+        FileFormatError: none, NaN, infinite, beyond any that is meant; names the place.
     """
     value = number_in(text)
     if not math.isfinite(value):

@@ -14,7 +14,10 @@ def check_file(path: str | Path, most: int) -> Path:
 
     Args:
         most: bytes that it may have.
-    Raises: InputError: there is none, or a folder, a pipe, a device. FileFormatError: a larger one.
+
+    Raises:
+        InputError: there is none, or a folder, a pipe, a device.
+        FileFormatError: a larger one.
     """
     path = Path(path)
     try:
@@ -57,7 +60,9 @@ def read_text(path: str | Path, most: int, expected: str) -> str:
 
     Args:
         expected: what kind of file it should be, for messages.
-    Raises: as read_bytes; FileFormatError: other bytes, an empty file.
+
+    Raises:
+        as read_bytes; FileFormatError: other bytes, an empty file.
     """
     try:
         text = read_bytes(path, most).decode("utf-8-sig")

@@ -28,8 +28,11 @@ def named_path(name: str, path: str | Path, expected: str) -> Path:
     """The path, unless nothing was given: Path("") would be the current folder.
 
     Args:
-        name: of what the path is for. expected: what may lie there.
-    Raises: InputError: an empty path, one that holds a NUL.
+        name: of what the path is for.
+        expected: what may lie there.
+
+    Raises:
+        InputError: an empty path, one that holds a NUL.
     """
     if not str(path):
         raise InputError(name, expected, "an empty name")
@@ -41,7 +44,8 @@ def named_path(name: str, path: str | Path, expected: str) -> Path:
 def check_regular(path: Path, kind: str) -> None:
     """Refuse what is there but is no file: opening a pipe or a device may wait for ever.
 
-    Raises: InputError: a folder, a pipe, a device, a socket, a name that cannot be one.
+    Raises:
+        InputError: a folder, a pipe, a device, a socket, a name that cannot be one.
     """
     try:
         mode = path.stat().st_mode
@@ -70,6 +74,7 @@ def check_readable(path: Path, kind: str) -> None:
 
 def plain_name(path: Path) -> str:
     """A file's name as every system can write it, within a path too: bytes that are no text,
+
     backslashes and control characters become %NN.
     """
     return _PLAINLESS.sub(lambda match: f"%{ord(match[0]) & 0xFF:02X}", path.name)

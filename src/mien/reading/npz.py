@@ -158,7 +158,9 @@ class ArrayFile:
 def _check_directory(path: Path, stream: IO[bytes]) -> None:
     """Refuse an archive of so many entries that listing them would take long.
 
-    Raises: FileFormatError, ValueError.
+    Raises:
+        FileFormatError: bad input.
+        ValueError: bad input.
     """
     if stream.read(6) == b"\x93NUMPY":
         raise FileFormatError(path, "expected an .npz file, found a single array")

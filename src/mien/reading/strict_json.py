@@ -21,8 +21,10 @@ from mien.reading.files import read_text
 def read_json(path: str | Path) -> dict[str, Any]:
     """The object in a JSON file.
 
-    Raises: InputError: the file cannot be read. FileFormatError: as parse_json; a file that is too
-        large, other bytes than UTF-8, another thing than an object.
+    Raises:
+        InputError: the file cannot be read.
+        FileFormatError: as parse_json; a file that is too large, other bytes than UTF-8, another
+            thing than an object.
     """
     data = parse_json(path, read_text(path, MAX_JSON_BYTES, "JSON in UTF-8"))
     if not isinstance(data, dict):
@@ -36,8 +38,10 @@ def parse_json(path: str | Path, text: str, *, line: int | None = None) -> Any:
     Args:
         path: the file, for messages.
         line: of the file that the text is, if it is but one of them.
-    Raises: FileFormatError: not JSON; a name that appears twice in one object; too many lists and
-        objects, too many within each other; a number of too many digits.
+
+    Raises:
+        FileFormatError: not JSON; a name that appears twice in one object; too many lists and
+            objects, too many within each other; a number of too many digits.
     """
     place = "" if line is None else f"line {line}"
     if text.count("[") + text.count("{") > MAX_CONTAINERS:

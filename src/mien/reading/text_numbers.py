@@ -20,7 +20,10 @@ class Numbers:
     Args:
         expected: what kind of file it should be, for messages.
         text: of the file, for who has read it.
-    Raises: InputError: the file cannot be read. FileFormatError: no text, empty, too large.
+
+    Raises:
+        InputError: the file cannot be read.
+        FileFormatError: no text, empty, too large.
     """
 
     def __init__(self, path: str | Path, expected: str, text: str | None = None) -> None:

@@ -25,8 +25,12 @@ def resample_curve(
     Args:
         curve: (M, 2) px, M >= 2, drawn as straight pieces; a repeated point counts once.
         fractions: (N,) in [0, 1], or a number of equally spaced points, ends included.
-    Raises: InputError: fewer than two different points, NaN, a fraction outside of [0, 1].
-    Source: P02 sec. 5.1.3, "stepping along them using an arc-length parameterization".
+
+    Raises:
+        InputError: fewer than two different points, NaN, a fraction outside of [0, 1].
+
+    Source:
+        [Pighin 2002] sec. 5.1.3, "stepping along them using an arc-length parameterization".
     """
     curve, lengths = _measured(curve)
     if isinstance(fractions, int):
@@ -41,7 +45,8 @@ class EpipolarPoints:
     """A curve's points that correspond to a reference curve's.
 
     Attributes:
-        points: (N, 2) px on the curve. fractions: (N,) of its length, never decreasing.
+        points: (N, 2) px on the curve.
+        fractions: (N,) of its length, never decreasing.
         matched: (N,) True where the epipolar line decided, False where arc length had to.
     """
 
@@ -70,12 +75,16 @@ def match_curve(
     Args:
         reference_points: (N, 2) px in order along the curve in the reference photo.
         curve: (M, 2) px, the same curve drawn in the other photo, in the same direction.
-        fractions: (N,) in [0, 1], increasing: the reference points' arc-length positions;
-            equally spaced unless given.
+        fractions: (N,) in [0, 1], increasing: the reference points' arc-length positions; equally
+            spaced unless given.
         max_shift: how far, as a fraction of length, a crossing may lie from its arc-length place.
         min_angle: radians between line and curve, below which a crossing is not used.
-    Raises: InputError: shapes, NaN, a curve of fewer than two points, decreasing fractions.
-    Source: P02 sec. 5.1.3, the alternative parameterization.
+
+    Raises:
+        InputError: shapes, NaN, a curve of fewer than two points, decreasing fractions.
+
+    Source:
+        [Pighin 2002] sec. 5.1.3, the alternative parameterization.
     """
     reference_points = check_array("reference_points", reference_points, (None, 2))
     count = len(reference_points)
@@ -99,6 +108,7 @@ def epipolar_lines(
     points: Float[Array, "n 2"], source: Camera, target: Camera
 ) -> Float[Array, "n 3"]:
     """Lines (a, b, c) with a x + b y + c = 0, a^2 + b^2 = 1, in the target's px, on which the
+
     source's image points must appear. NaN where the cameras share their place.
     """
     to_target = target.R_cam_head @ source.R_cam_head.T

@@ -38,7 +38,8 @@ class Features:
 
     Attributes:
         names: (N) point, POLYLINE.INDEX, or landmark number.
-        corners: (N, 3) vertices of the triangle that holds the place; barycentrics: (N, 3) in it.
+        corners: (N, 3) vertices of the triangle that holds the place.
+        barycentrics: (N, 3) in it.
         image_points: (K, N, 2) px, NaN where unseen.
         sigma_mm: (K, N) standard deviation of the observation on the surface; inf where unseen.
         by_hand: (K, N) True for a mark that a person made.
@@ -139,7 +140,7 @@ def image_points_for_cameras(features: Features) -> Float[Array, "k n 2"]:
     """(K, N, 2) px, NaN for points of drawn curves in photos that have enough named ones.
 
     Until cameras are known a curve's points are placed by arc length, which foreshortening
-    falsifies; P02 (sec. 5.1.3) leaves them out of the pose for the same reason.
+    falsifies; [Pighin 2002] (sec. 5.1.3) leaves them out of the pose for the same reason.
     """
     drawn = features.by_hand & (features.sigma_mm == CURVE_SIGMA_MM)
     named = features.by_hand & ~drawn
@@ -150,10 +151,13 @@ def image_points_for_cameras(features: Features) -> Float[Array, "k n 2"]:
 def rematch_curves(
     features: Features, views: Sequence[View], cameras: Sequence[Camera], generic: GenericHead
 ) -> Features:
-    """Points of the drawn curves moved along them to where the epipolar lines say (P02 5.1.3).
+    """Points of the drawn curves moved along them to where the epipolar lines say.
 
     For each curve the photo whose points were marked most squarely, the one that shows it longest
     in pixels, serves as the reference; the others follow it.
+
+    Source:
+        [Pighin 2002] 5.1.3.
     """
     image = features.image_points.copy()
     columns = {int(a): n for n, (a, b, _) in enumerate(features.corners) if a == b}

@@ -1,4 +1,4 @@
-"""Photos of one expression to cameras and a shape: the whole of P02 sec. 5.1, and past it."""
+"""Photos of one expression to cameras and a shape: [Pighin 2002] sec. 5.1, and past it."""
 
 from __future__ import annotations
 
@@ -69,8 +69,12 @@ def fit_views(
 
     Args:
         progress: told the steps of the registration done and their total.
-    Raises: EstimationError: no photo fits.
-    Source: P02 sec. 5.1; the registration of several photos is ours (docs/registration.md).
+
+    Raises:
+        EstimationError: no photo fits.
+
+    Source:
+        [Pighin 2002] sec. 5.1; the registration of several photos is ours (docs/registration.md).
     """
     from threadpoolctl import threadpool_limits
 

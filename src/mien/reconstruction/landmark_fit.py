@@ -1,4 +1,4 @@
-"""Cameras and shape from marks and landmarks alone: P02 sec. 5.1, and a joint adjustment."""
+"""Cameras and shape from marks and landmarks: [Pighin 2002] sec. 5.1, and bundle adjustment."""
 
 from __future__ import annotations
 
@@ -40,11 +40,13 @@ class FitOptions:
     """How a fit is done; the defaults are what works best.
 
     Attributes:
-        adjust: joint bundle adjustment under the identity prior after P02's five steps; without it,
-            cameras come from the five steps and shape from ray intersection alone, as in P02.
+        adjust: joint bundle adjustment under the identity prior after [Pighin 2002]'s five steps;
+            without it, cameras come from the five steps and shape from ray intersection alone, as
+            in [Pighin 2002].
         dense: register several photos by all the skin that they share; without it, and always for
             one photo, marks and landmarks alone decide.
-        curves: "epipolar" or "arc-length", how drawn curves become points (P02 sec. 5.1.3).
+        curves: "epipolar" or "arc-length", how drawn curves become points ([Pighin 2002] sec.
+            5.1.3).
         kernel: radial basis of the deformation (numeric.rbf).
         interpupillary_mm: measured distance between the pupils, which sets the scale.
         rounds: times that curves and shape are refined.
@@ -83,7 +85,7 @@ class Solution:
 def solve_by_features(
     views: Sequence[View], features: Features, generic: GenericHead, options: FitOptions
 ) -> Solution:
-    """P02's five steps, then as often as asked for: curves, joint adjustment or rays, shape."""
+    """[Pighin 2002]'s five steps, then, repeated: curves, joint adjustment or rays, shape."""
     try:
         start = recover_pose(
             image_points_for_cameras(features),
@@ -148,7 +150,7 @@ def _adjust(
 def _intersect(
     features: Features, cameras: tuple[Camera, ...], places: Float[Array, "n 3"]
 ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
-    """P02 sec. 5.1.3: the features where their rays meet, and how far those miss each other."""
+    """[Pighin 2002] sec. 5.1.3: the features where their rays meet, and how far those miss."""
     weights = 1 / features.sigma_mm**2
     rays = intersect_rays(cameras, features.image_points, weights=weights, current=places)
     return rays.points, np.where(rays.solved, rays.residual_mm, PRIOR_DEVIATION_MM)

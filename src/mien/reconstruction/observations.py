@@ -18,9 +18,12 @@ class Sightings:
     """M places of the head, each seen in a photo.
 
     Attributes:
-        corners: (M, 3) vertices of the triangle that holds the place; barycentrics: (M, 3) in it.
+        corners: (M, 3) vertices of the triangle that holds the place.
+        barycentrics: (M, 3) in it.
         beside: (M, 3) mm, how far off that place this person's head has what is seen.
-        photo: (M,). image_points: (M, 2) px. sigma_mm: (M,) error of the sighting on the surface.
+        photo: (M,).
+        image_points: (M, 2) px.
+        sigma_mm: (M,) error of the sighting on the surface.
     """
 
     corners: Int[Array, "m 3"]
@@ -52,7 +55,8 @@ class Misses:
     """How far cameras see M places from where the photos show them.
 
     Attributes:
-        residuals: (M, 2) px. weights: (M,) 1 / px^2, Cauchy's over the error's variance.
+        residuals: (M, 2) px.
+        weights: (M,) 1 / px^2, Cauchy's over the error's variance.
         projection: with derivatives.
     """
 
@@ -66,7 +70,8 @@ def measure_misses(
 ) -> Misses:
     """Where the cameras see the places, (M, 3) mm, less where they were found.
 
-    Raises: EstimationError: a place lies behind its camera.
+    Raises:
+        EstimationError: a place lies behind its camera.
     """
     photo = sightings.photo
     seen = project_places(Pinholes.of(cameras), photo, places)

@@ -125,7 +125,9 @@ def _edge_misfit(
     solution: Solution, found: Registration, residuals: Float[Array, "k n 2"]
 ) -> float:
     """How many expected errors the landmarks on edges lie off the registered head's, in the median;
-    0 without landmarks."""
+
+    0 without landmarks.
+    """
     features = solution.features
     used = features.seen & features.on_edges
     if not used.any():

@@ -25,8 +25,12 @@ def place_cameras(
     """Where each photo was taken from, by where it shows the features of a head.
 
     Args:
-        features: of the same K photos. focal_px: (K,). vertices: (V, 3) mm.
-    Raises: EstimationError: fewer than four features in a photo, or no camera that sees them so.
+        features: of the same K photos.
+        focal_px: (K,).
+        vertices: (V, 3) mm.
+
+    Raises:
+        EstimationError: fewer than four features in a photo, or no camera that sees them so.
     """
     places = features.on(vertices)
     return tuple(

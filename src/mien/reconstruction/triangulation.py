@@ -48,11 +48,15 @@ def intersect_rays(
         image_points: (K, N, 2) px, NaN where a camera does not show a point.
         weights: (K, N) >= 0 of the squared distances; equal unless given.
         current: (N, 3) mm, where the points are thought to be. With it, directions that the rays
-            leave open (along the only ray, or along nearly parallel ones) are taken from there:
-            a point seen once becomes the place on its ray nearest to `current`.
+            leave open (along the only ray, or along nearly parallel ones) are taken from there: a
+            point seen once becomes the place on its ray nearest to `current`.
         min_angle: radians; rays closer than this do not tell depth.
-    Raises: InputError: shapes, NaN in current, negative weights.
-    Source: P02 sec. 5.1.3.
+
+    Raises:
+        InputError: shapes, NaN in current, negative weights.
+
+    Source:
+        [Pighin 2002] sec. 5.1.3.
     """
     image = check_array("image_points", image_points, (len(cameras), None, 2), finite=False)
     count = image.shape[1]

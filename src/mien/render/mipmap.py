@@ -24,7 +24,9 @@ class Pyramids(NamedTuple):
 
     Attributes:
         texels: (K, N) uint32, red in the lowest byte; level after level, row after row.
-        widths, heights, starts: (L,) each level's size and its first texel.
+        widths: (L,) each level's size and its first texel.
+        heights: (L,) each level's size and its first texel.
+        starts: (L,) each level's size and its first texel.
     """
 
     texels: Int[Array, "k n"]
@@ -84,7 +86,8 @@ def level_of_detail(
     """(V,) log2 of the texels along a sample's side, from the areas of the triangles around.
 
     Args:
-        texels: (F,) of texel_areas. points: (V, 2) samples' widths.
+        texels: (F,) of texel_areas.
+        points: (V, 2) samples' widths.
     """
     detail = np.empty(len(points), np.float32)
     _level_of_detail(texels, points, triangles, detail)
@@ -115,7 +118,8 @@ def place_lookup(pyramids: Pyramids, u: float, v: float, level: float) -> tuple[
     Trilinear: bilinear in the two levels that come nearest to one texel a sample. u goes around,
     v points up and ends at the image's edge.
 
-    Returns: four in the finer and four in the coarser level.
+    Returns:
+        four in the finer and four in the coarser level.
     """
     last = len(pyramids.starts) - 1
     level = min(max(level, 0.0), float(last))

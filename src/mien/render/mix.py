@@ -1,4 +1,8 @@
-"""One pass over the samples that mixes textures by weights at the vertices (P02 eq. 5)."""
+"""One pass over the samples that mixes textures by weights at the vertices.
+
+Source:
+    [Pighin 2002] eq. 5.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +37,8 @@ class Painted(NamedTuple):
     """Triangles and their textures: what does not change with the face.
 
     Attributes:
-        triangles: (F, 3) vertex indices. uvs: (F, 3, 2) of every triangle's corners.
+        triangles: (F, 3) vertex indices.
+        uvs: (F, 3, 2) of every triangle's corners.
         texels: (F,) how many each triangle covers.
     """
 
@@ -124,8 +129,10 @@ class Fragments(NamedTuple):
     """What the triangles show of a row of pixels: each triangle in each pixel once.
 
     Attributes:
-        triangles: of the coverage. columns: of pixels; the first holds the coverage's first.
-        x, y: in the strip, the middle of the samples that show the triangle.
+        triangles: of the coverage.
+        columns: of pixels; the first holds the coverage's first.
+        x: in the strip, the middle of the samples that show the triangle.
+        y: in the strip, the middle of the samples that show the triangle.
         shares: how many those are, of all in the pixel.
     """
 
@@ -259,7 +266,7 @@ def _add_colours(
     places: Array,
     colours: Array,
 ) -> None:
-    """P02 eq. (5): add to every pixel its fragments' weighted sums of the textures."""
+    """[Pighin 2002] eq. (5): add to every pixel its fragments' weighted sums of the textures."""
     shades, mixed = surface.shades, surface.mixed
     for f in range(count):
         t = fragments.triangles[f]

@@ -1,4 +1,4 @@
-"""A face that mixes several textures, drawn in one pass (P02 sec. 6.1, eq. 5)."""
+"""A face that mixes several textures, drawn in one pass ([Pighin 2002] sec. 6.1, eq. 5)."""
 
 from __future__ import annotations
 
@@ -22,8 +22,10 @@ class MorphRenderer:
         mesh: the head's topology, texture coordinates and parts; its vertices do not matter.
         textures: of one size, in the mesh's own texture coordinates.
         parts: names of the parts to show; by default those that pictures show.
-    Raises: InputError: a mesh without texture coordinates, unknown parts, no textures, sizes that
-        differ.
+
+    Raises:
+        InputError: a mesh without texture coordinates, unknown parts, no textures, sizes that
+            differ.
     """
 
     def __init__(
@@ -54,8 +56,10 @@ class MorphRenderer:
             samples: per pixel, 1, 4 or 9: more make smooth edges; within a triangle the textures
                 are looked up once a pixel.
             background: a colour or an image; alpha is then 255 everywhere.
-        Raises: InputError: another number of vertices or textures than the renderer's, a
-            background of another size than the camera's.
+
+        Raises:
+            InputError: another number of vertices or textures than the renderer's, a background of
+                another size than the camera's.
         """
         factor = samples_across(samples)
         if face.weights.shape != self._shape:

@@ -31,11 +31,14 @@ def orbit_camera(
         yaw: radians; positive sees more of the subject's left side.
         pitch: radians; positive looks down from above.
         roll: radians; positive turns the camera so that the head seems to turn counter-clockwise.
-        width, height: px.
+        width: px.
+        height: px.
         vertices: (V, 3) mm; the same for all cameras of a turn, so that the head keeps its size.
         fov: radians over the image's longer side; the default is a portrait lens.
         margin: share of the image that stays free on every side.
-    Raises: InputError: shapes, sizes, a field of view of 0 or of pi and more, a margin of a half.
+
+    Raises:
+        InputError: shapes, sizes, a field of view of 0 or of pi and more, a margin of a half.
     """
     vertices = check_array("vertices", vertices, (None, 3))
     if not len(vertices):
@@ -74,7 +77,8 @@ def turntable(
 ) -> Iterator[Camera]:
     """Cameras once around the head, starting in front; the last frame leads back to the first.
 
-    Raises: InputError: as orbit_camera; fewer than one frame.
+    Raises:
+        InputError: as orbit_camera; fewer than one frame.
     """
     check_positive("frames", frames)
     for frame in range(frames):

@@ -28,8 +28,11 @@ def overlay_mesh(
 
     Args:
         parts: names of the parts to draw; by default those that pictures show.
-        colour: sRGB of the lines. opacity: from 0 to 1.
-    Raises: InputError: a photo of another size than the camera's.
+        colour: sRGB of the lines.
+        opacity: from 0 to 1.
+
+    Raises:
+        InputError: a photo of another size than the camera's.
     """
     import cv2
 

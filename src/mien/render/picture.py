@@ -26,8 +26,11 @@ class HeadRenderer:
     """Draws one head in any state; what all its pictures share is prepared once.
 
     Attributes:
-        head: the head. rig: what poses its face; one that is there already may be given.
-    Raises: InputError: as Rig.
+        head: the head.
+        rig: what poses its face; one that is there already may be given.
+
+    Raises:
+        InputError: as Rig.
     """
 
     def __init__(self, head: Head, *, rig: Rig | None = None) -> None:
@@ -89,14 +92,18 @@ def render_head(
 
     Args:
         head: or what HeadRenderer prepared of it, for many pictures of one head.
-        yaw, pitch, roll: radians, as docs/conventions.md says.
+        yaw: radians, as docs/conventions.md says.
+        pitch: radians, as docs/conventions.md says.
+        roll: radians, as docs/conventions.md says.
         size: width and height in px; with `photo`, the photo's own.
         photo: reproduce the view of this photo instead of turning the head: its camera and, unless
             the state says which expressions to mix, the expression that it belongs to.
         state: what the face does; nothing by default.
         background: sRGB; transparent unless given.
-    Raises: InputError: no such photo, region, expression or unit; weights outside [-0.5, 1.5]; a
-        picture of more than MAX_SIDE px a side.
+
+    Raises:
+        InputError: no such photo, region, expression or unit; weights outside [-0.5, 1.5]; a
+            picture of more than MAX_SIDE px a side.
     """
     renderer = head if isinstance(head, HeadRenderer) else HeadRenderer(head)
     state = state or FaceState()

@@ -23,8 +23,11 @@ class Light:
     """Diffuse light on an untextured head: a key, a weaker fill, and what comes from everywhere.
 
     Attributes:
-        key, fill: (3,) directions towards the lights in camera space (x right, y down, z forward).
-        key_strength, fill_strength, ambient: their sum is the brightest that a surface can be.
+        key: (3,) directions towards the lights in camera space (x right, y down, z forward).
+        fill: as `key`.
+        key_strength: their sum is the brightest that a surface can be.
+        fill_strength: their sum is the brightest that a surface can be.
+        ambient: their sum is the brightest that a surface can be.
     """
 
     key: tuple[float, float, float] = (-0.5, -0.6, -1.0)
@@ -59,7 +62,9 @@ def render(
         light: shades the head; by default one of clay, and photographed colours as they are, since
             photos have their light in them.
         background: a colour or an image; alpha is then 255 everywhere.
-    Raises: InputError: shapes, a texture on a mesh without texture coordinates, unknown parts.
+
+    Raises:
+        InputError: shapes, a texture on a mesh without texture coordinates, unknown parts.
     """
     factor = samples_across(samples)
     if texture is not None and vertex_colours is not None:
@@ -102,12 +107,14 @@ def _coloured(
 
 def shown_parts(mesh: Mesh) -> tuple[str, ...]:
     """The parts that pictures show by default: not the hair cap, a helper, and not the lashes,
-    which are opaque sheets."""
+
+    which are opaque sheets.
+    """
     return tuple(name for name in mesh.part_names if name not in ("hair", "lashes"))
 
 
 def rasterize_mesh(mesh: Mesh, camera: Camera, *, cull: bool = False) -> Raster:
-    """The mesh as the camera sees it (numeric.raster.rasterizer.rasterize in the camera's pixels)."""
+    """The mesh as the camera sees it (`rasterize` in the camera's pixels)."""
     depth, pixels = camera.to_camera(mesh.vertices)[:, 2], project_safely(mesh.vertices, camera)
     return rasterize(pixels, depth, mesh.triangles, camera.width, camera.height, cull=cull)
 

@@ -41,7 +41,8 @@ def expression_rows(
     """For each expression its photo, its picture from that camera, and mixtures with neutral.
 
     Args:
-        photos: pixels by name. progress: told how many expressions are done.
+        photos: pixels by name.
+        progress: told how many expressions are done.
     """
     if not count_expressions(head):
         return []

@@ -1,7 +1,7 @@
 """Blending weights of basic expressions, and the few numbers that stand for them.
 
 Weights of m expressions that sum to 1 form a hyperplane, so m - 1 expression parameters say as
-much: w = Q alpha + w*. Source: P02 sec. 6.1.1, eq. (4).
+much: w = Q alpha + w*. Source: [Pighin 2002] sec. 6.1.1, eq. (4).
 """
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ from mien.arrays import Array, Float, check_array, frozen
 from mien.errors import InputError
 
 WEIGHT_RANGE = (-0.5, 1.5)
-"""The lowest and the highest weight allowed: beyond, faces turn unreal (P02 sec. 6.1.1)."""
+"""The lowest and the highest weight allowed: beyond, faces turn unreal.
+
+Source: [Pighin 2002] sec. 6.1.1.
+"""
 
 _TOLERANCE = 1e-6
 
@@ -29,8 +32,12 @@ class Basis:
         Q: (m, k) linearly independent columns, each of which sums to 0; k = m - 1 reaches every
             mixture of the m expressions, fewer columns only some.
         w_star: (m,) sums to 1: the weights at alpha = 0, the mean of all expressions.
-    Raises: InputError: sums that differ from these, columns that depend on each other.
-    Source: P02 sec. 6.1.1, eq. (4).
+
+    Raises:
+        InputError: sums that differ from these, columns that depend on each other.
+
+    Source:
+        [Pighin 2002] sec. 6.1.1, eq. (4).
     """
 
     Q: Float[Array, "m k"]
@@ -52,7 +59,8 @@ class Basis:
     def by_differences(cls, m: int, *, reference: int = 0) -> Basis:
         """One parameter for each other expression: how far from the reference towards it.
 
-        Raises: InputError: no expression, a reference that is none of them.
+        Raises:
+            InputError: no expression, a reference that is none of them.
         """
         if m < 1:
             raise InputError("m", "at least one expression", m)
@@ -66,7 +74,8 @@ class Basis:
     def by_gram_schmidt(cls, m: int, *, reference: int = 0) -> Basis:
         """The differences made orthonormal, one after the other in their order.
 
-        Raises: InputError: no expression, a reference that is none of them.
+        Raises:
+            InputError: no expression, a reference that is none of them.
         """
         differences = cls.by_differences(m, reference=reference)
         Q, R = np.linalg.qr(differences.Q)
@@ -85,7 +94,9 @@ class Basis:
             examples: (m, d) geometry (and texture) of each expression as one row, in units that
                 make its parts comparable.
             count: how many columns to keep, 0 to m - 1; all by default.
-        Raises: InputError: no expression, NaN, another count.
+
+        Raises:
+            InputError: no expression, NaN, another count.
         """
         examples = check_array("examples", examples, (None, None))
         plane = cls.by_gram_schmidt(len(examples))
@@ -109,7 +120,8 @@ class Basis:
     def alpha(self, weights: Float[Array, "*batch m"]) -> Float[Array, "*batch k"]:
         """The parameters whose weights come nearest in least squares; exact where Q reaches.
 
-        Raises: InputError: another number of weights.
+        Raises:
+            InputError: another number of weights.
         """
         weights = np.asarray(weights, dtype=np.float64)
         _check_last_axis("weights", weights, len(self.Q))
@@ -129,8 +141,10 @@ def check_weights(
     Args:
         weights: one for each expression along the last axis.
         name: how the message calls them.
-    Raises: InputError: not finite, a sum that is off 1 by more than 1e-6, one that lies outside
-        WEIGHT_RANGE.
+
+    Raises:
+        InputError: not finite, a sum that is off 1 by more than 1e-6, one that lies outside
+            WEIGHT_RANGE.
     """
     weights = np.asarray(weights)
     weights = check_array(name, weights, (None,) * max(weights.ndim, 1))
@@ -153,8 +167,10 @@ def outside_hull(
     Args:
         weights: one for each expression along the last axis.
         names: of the expressions; counted from 0 by default.
-    Returns: one line that names the expressions with their farthest weight; None when every
-        mixture lies within the convex hull of the photographed expressions.
+
+    Returns:
+        one line that names the expressions with their farthest weight; None when every mixture lies
+        within the convex hull of the photographed expressions.
     """
     rows = np.asarray(weights, dtype=np.float64).reshape(-1, np.shape(weights)[-1])
     names = [str(index) for index in range(rows.shape[1])] if names is None else names

@@ -1,7 +1,7 @@
 """Textures of a person's expressions: each one's photos over neutral's, eyes and teeth in common.
 
 Eyes and teeth are half hidden in most photos. What one expression shows of them serves all others
-(P02 sec. 5.2.4), as bright as the opening of lids and lips lets them be.
+([Pighin 2002] sec. 5.2.4), as bright as the opening of lids and lips lets them be.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ class Photographed:
     """An expression's shape and photos.
 
     Attributes:
-        vertices: (V, 3) mm, eyes turned. cameras, photos: of those that show it.
+        vertices: (V, 3) mm, eyes turned.
+        cameras: of those that show it.
+        photos: of those that show it.
     """
 
     vertices: Float[Array, "v 3"]
@@ -67,7 +69,8 @@ class Looks:
     """How a person looks in each expression.
 
     Attributes:
-        textures: (H, W, 3) by expression. shading: of eyes and teeth.
+        textures: (H, W, 3) by expression.
+        shading: of eyes and teeth.
         gains: (K, 3) by expression, what each photo's colours were multiplied by.
     """
 
@@ -85,7 +88,8 @@ def paint_expressions(
     """Every expression's texture in the layout of neutral's.
 
     Args:
-        mesh: neutral. photographed: by expression, neutral among them.
+        mesh: neutral.
+        photographed: by expression, neutral among them.
         base: (H, W, 3) neutral's texture from all of its photos, holes filled.
     """
     height, width = base.shape[:2]
@@ -138,7 +142,8 @@ def _look(
             range(len(item.cameras)), np.sum(list(default_masks(generic).values()), axis=0)
         )
     # The photos of a neutral face from several sides are blended already. What lies between and
-    # around lids and lips comes from one photo for each (P02 sec. 5.2.4): two would not agree.
+    # around lids and lips comes from one photo for each: two would not agree
+    # ([Pighin 2002] sec. 5.2.4).
     looks = [
         seen_by([_best_view(mesh, lines, item.cameras)], mask)
         for lines, mask in _slits(mesh, generic)
@@ -225,8 +230,10 @@ def _common_parts(
     generic: GenericHead,
 ) -> Float[Array, "h w 3"]:
     """(H, W, 3) eyes and teeth in full light: from the expression that shows most of each, then
+
     from the next. What none shows has neutral's colours, or usual ones, which take on the light
-    that is on the skin."""
+    that is on the skin.
+    """
     common = base.astype(np.float32)
     tint = _tint(surface, mesh, base)
     places = over_vertices(surface, mesh, generic.mesh.vertices)

@@ -27,8 +27,8 @@ class Eyeball:
     Attributes:
         vertices: (B,) its vertices.
         centre: (3,) mm.
-        shape: (3, 3) takes the unit sphere around the origin to the eyeball around its centre.
-            Its largest vertex lies on it: cornea and facets are inside.
+        shape: (3, 3) takes the unit sphere around the origin to the eyeball around its centre. Its
+            largest vertex lies on it: cornea and facets are inside.
     """
 
     vertices: Int[Array, " b"]
@@ -183,8 +183,9 @@ class Look:
     ) -> tuple[Float[Array, " u"], Float[Array, "2 2"]]:
         """What the weights of all units and a gaze (yaw and pitch, radians) come to.
 
-        Returns: (U,) the weights of the units' offsets, lids going along with the gaze; (2, 2)
-            rad, yaw and pitch of the left and the right eyeball.
+        Returns:
+            (U,) the weights of the units' offsets, lids going along with the gaze; (2, 2) rad, yaw
+            and pitch of the left and the right eyeball.
         """
         asked, weights = units[self.units], units.copy()
         weights[self.units] += self._lid_weights(gaze)

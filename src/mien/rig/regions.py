@@ -1,4 +1,4 @@
-"""The regions of the face that are controlled independently (P02 sec. 6.1.1, fig. 9)."""
+"""The regions of the face that are controlled independently ([Pighin 2002] sec. 6.1.1, fig. 9)."""
 
 from __future__ import annotations
 
@@ -102,7 +102,9 @@ def check_masks(masks: Mapping[str, object], vertices: int) -> dict[str, Float[A
     """(V,) masks by name, in the order of MASKS, scaled down where they sum to more than 1.
 
     A region that is left out has an empty mask: the face's weights hold there.
-    Raises: InputError: an unknown name, another shape, values outside [0, 1].
+
+    Raises:
+        InputError: an unknown name, another shape, values outside [0, 1].
     """
     for name in masks:
         if name not in MASKS:

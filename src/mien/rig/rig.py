@@ -32,10 +32,14 @@ class Rig:
         names: photographed expressions, neutral first: what the weights' columns stand for.
         textures: (h, w, 3) one for each name, of one size.
         offsets: (K, V, 3) mm from neutral to each of them, eyeballs where neutral has them.
-    Raises: InputError: a head of another topology than the generic one's, no texture for neutral,
-        textures of different sizes.
-    Source: P02 sec. 6.1.1: consensus geometry, weights by region. Units, contacts and what of an
-        expression comes along with the units that explain it are ours (docs/expressions.md).
+
+    Raises:
+        InputError: a head of another topology than the generic one's, no texture for neutral,
+            textures of different sizes.
+
+    Source:
+        [Pighin 2002] sec. 6.1.1: consensus geometry, weights by region. Units, contacts and what of
+        an expression comes along with the units that explain it are ours (docs/expressions.md).
     """
 
     def __init__(self, head: Head) -> None:
@@ -81,7 +85,9 @@ class Rig:
 
         Args:
             contacts: whether lids ride on the eyes and lips do not pass through each other.
-        Raises: InputError: an unknown region, expression or unit; weights outside [-0.5, 1.5].
+
+        Raises:
+            InputError: an unknown region, expression or unit; weights outside [-0.5, 1.5].
         """
         gaze = np.array([state.gaze.yaw, state.gaze.pitch])
         by_region = self._region_weights(state.expressions)
@@ -99,7 +105,8 @@ class Rig:
 
         Args:
             by_region: weights of the expressions in each of REGIONS.
-            units: weights. gaze: yaw and pitch, radians.
+            units: weights.
+            gaze: yaw and pitch, radians.
         """
         weights = self._shares @ by_region
         moved = bool(units.any() or gaze.any())
@@ -131,7 +138,9 @@ class Rig:
             offsets: (V, 3) mm, how the mixed face moves on.
             turn: radians, yaw and pitch by which the left and the right eye turn on.
             contacts: as for evaluate.
-        Raises: InputError: shape, not finite.
+
+        Raises:
+            InputError: shape, not finite.
         """
         shape = (len(self._neutral), len(self.names))
         weights = check_array("weights", weights, shape)
@@ -149,7 +158,8 @@ class Rig:
     def mask(self, region: str) -> Float[Array, " v"]:
         """(V,) in [0, 1]: how far each vertex obeys this region's weights.
 
-        Raises: InputError: an unknown region.
+        Raises:
+            InputError: an unknown region.
         """
         _check_known("region", region, AROUND)
         inside = [region in (name, *AROUND[name]) for name in MASKS]
@@ -159,7 +169,8 @@ class Rig:
     def hull_notes(self, state: FaceState) -> tuple[str, ...]:
         """What a state asks for beyond the expressions that were photographed, by its regions.
 
-        Raises: InputError: as evaluate.
+        Raises:
+            InputError: as evaluate.
         """
         self._region_weights(state.expressions)
         self._unit_weights(state.units)
@@ -229,7 +240,7 @@ class Rig:
     def _brightness(
         self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
     ) -> Float[Array, " v"]:
-        """P02 sec. 5.2.4, over the shadow that is in the mixed textures already."""
+        """[Pighin 2002] sec. 5.2.4, over the shadow that is in the mixed textures already."""
         now = brightness_at(self._openings.measure(vertices), self._shading)
         brightness = np.ones(len(vertices))
         for column, part in enumerate(self._shaded):
@@ -241,7 +252,8 @@ class Rig:
 def region_rows(regions: Sequence[str]) -> Int[Array, " r"]:
     """(R,) which of these regions each of REGIONS obeys, counted from 1; 0 for none.
 
-    Raises: InputError: an unknown region.
+    Raises:
+        InputError: an unknown region.
     """
     for region in regions:
         _check_known("region", region, AROUND)

@@ -1,4 +1,4 @@
-"""Eyes and teeth in the shadow of lids and lips (P02 sec. 5.2.4)."""
+"""Eyes and teeth in the shadow of lids and lips ([Pighin 2002] sec. 5.2.4)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ class Openings:
 
     Attributes:
         lids: vertex pairs in the middle of the left and the right eye, (2, 2).
-        lips: the pair in the middle of the mouth; corners: the mouth's.
+        lips: the pair in the middle of the mouth.
+        corners: the mouth's.
         neutral: (2,) mm between the lids in neutral.
     """
 
@@ -79,7 +80,9 @@ def fit_polynomial(part: str, measured: Sequence[tuple[float, float, float]]) ->
         part: "eyes" or "teeth", whose usual polynomial is the prior's mean.
         measured: an opening, another one, and the brightness at the first over that at the other,
             of each pair of photos.
-    Source: P02 sec. 5.2.4; few photos do not tell three coefficients, hence the prior.
+
+    Source:
+        [Pighin 2002] sec. 5.2.4; few photos do not tell three coefficients, hence the prior.
     """
     usual, spread = np.array(SHADING[part]), np.array(_PRIOR_SD)
     table = np.array(measured, float).reshape(-1, 3)

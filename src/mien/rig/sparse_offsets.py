@@ -16,7 +16,8 @@ class SparseOffsets:
 
     Attributes:
         starts: (U + 1,) where each one's entries begin, and where the last one's end.
-        vertices: (N,) unsigned, that an entry moves. moves: (N, 3) mm at weight 1.
+        vertices: (N,) unsigned, that an entry moves.
+        moves: (N, 3) mm at weight 1.
     """
 
     starts: Int[Array, " u+1"]

@@ -16,8 +16,11 @@ class Gaze:
     """Where the eyes look, radians from straight ahead.
 
     Attributes:
-        yaw: positive to the subject's left. pitch: positive up.
-    Raises: InputError: not finite.
+        yaw: positive to the subject's left.
+        pitch: positive up.
+
+    Raises:
+        InputError: not finite.
     """
 
     yaw: float = 0.0
@@ -35,8 +38,8 @@ class FaceState:
         expressions: weights of photographed expressions by region: {"face": {"joy": 0.6}} holds
             everywhere, {"mouth": {"anger": 0.4}} instead of it in the mouth, {"left_mouth": ...}
             instead of both in its left half. What is missing to 1 is neutral's.
-        units: weights of face units by name; 0 to 1 is their usual range, all that a rig
-            takes is mien.limits.UNIT_RANGE.
+        units: weights of face units by name; 0 to 1 is their usual range, all that a rig takes is
+            mien.limits.UNIT_RANGE.
         gaze: where the eyes look.
     """
 
@@ -57,7 +60,9 @@ class PosedFace:
 
     Args:
         finite: look for NaN and infinity; not needed for what follows from finite numbers.
-    Raises: InputError: shape, not finite.
+
+    Raises:
+        InputError: shape, not finite.
     """
 
     vertices: Float[Array, "v 3"]

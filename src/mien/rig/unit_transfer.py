@@ -43,9 +43,13 @@ def transfer_units(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float
 
     Args:
         vertices: (V, 3) mm, head space, the generic topology; the neutral face.
-    Raises: InputError: shape, NaN.
-    Source: after Sumner and Popovic, Deformation transfer for triangle meshes, SIGGRAPH 2004;
-        differs in that gradients live on the generic mesh, whose triangles are all sound, and are
+
+    Raises:
+        InputError: shape, NaN.
+
+    Source:
+        after Sumner and Popovic, Deformation transfer for triangle meshes, SIGGRAPH 2004; differs
+        in that gradients live on the generic mesh, whose triangles are all sound, and are
         conjugated with the stretch between the heads, so that amplitudes follow its proportions.
     """
     vertices = check_array("vertices", vertices, generic.mesh.vertices.shape)

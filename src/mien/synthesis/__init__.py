@@ -1,1 +1,1 @@
-"""Expressions from feature points: examples mixed by geometry (Z06)."""
+"""Expressions from feature points: examples mixed by geometry ([Zhang 2006])."""

@@ -48,11 +48,15 @@ class SynthesisOptions:
     """What differs from the paper can be switched off, one by one or by `paper`.
 
     Attributes:
-        distance_penalty, slack, together: as for `coefficients`.
+        distance_penalty: as for `coefficients`.
+        slack: as for `coefficients`.
+        together: as for `coefficients`.
         propagation: how all points come from some: "closed-form" is the one that was measured
             better, "printed" the paper's.
-    Raises: InputError: another name of a propagation, a penalty or slack that is no number from 0;
-        a slack above 1.
+
+    Raises:
+        InputError: another name of a propagation, a penalty or slack that is no number from 0; a
+            slack above 1.
     """
 
     distance_penalty: float = DISTANCE_PENALTY
@@ -72,7 +76,7 @@ class SynthesisOptions:
 
     @classmethod
     def paper(cls) -> SynthesisOptions:
-        """What Z06 prints.
+        """What [Zhang 2006] prints.
 
         What has no switch stays: teeth of a shut mouth come from all examples, and the printed
         propagation keeps more components (`propagate.COMPONENTS`).
@@ -89,8 +93,8 @@ class Synthesis:
         points: (n, 2) px of it.
         coefficients: (R, m) share of each example in each subregion; rows sum to 1.
         hull_px: (R,) root of the mean squared distance of each subregion's points, px of the
-            neutral photo, from those of the mix that it was made from. In 99 of 100 frames of d6
-            at most 0.4 px more than `hull_distances`, what no mix at all would reach; but 1.7 for
+            neutral photo, from those of the mix that it was made from. In 99 of 100 frames of d6 at
+            most 0.4 px more than `hull_distances`, what no mix at all would reach; but 1.7 for
             brows, which share one mix with the forehead, and 1.1 for teeth, which few examples
             show.
     """
@@ -107,8 +111,12 @@ class Synthesizer:
     Args:
         examples: of the person.
         options: beyond the paper or not.
-    Raises: InputError: as `Composer`.
-    Source: Z06 sections 6, 7, 10.
+
+    Raises:
+        InputError: as `Composer`.
+
+    Source:
+        [Zhang 2006] sections 6, 7, 10.
     """
 
     def __init__(self, examples: ExampleSet, options: SynthesisOptions | None = None) -> None:
@@ -130,13 +138,20 @@ class Synthesizer:
             head: "told": how the head moved is told by the known points, both here and in the
                 expressions that are learned from; one or two cannot tell it, and leave the head
                 still. "still": it is where the neutral photo has it, as when someone drags points
-                there. A few points of a still head must not tell its motion: of three at the
-                mouth the others are then 8 px off, where they are 2 px off otherwise (d10). For a
-                moved head the opposite is far worse; `plausible.head_moved` tells which.
-        Returns: (n, 2) px of the neutral photo; the known points exactly where they were given.
-        Raises: InputError: no points, unknown or repeated ones, shapes, NaN, fewer than two
-            expressions to learn from. EstimationError: all points in one place.
-        Source: Z06 sections 10 and 12.
+                there. A few points of a still head must not tell its motion: of three at the mouth
+                the others are then 8 px off, where they are 2 px off otherwise (d10). For a moved
+                head the opposite is far worse; `plausible.head_moved` tells which.
+
+        Returns:
+            (n, 2) px of the neutral photo; the known points exactly where they were given.
+
+        Raises:
+            InputError: no points, unknown or repeated ones, shapes, NaN, fewer than two expressions
+                to learn from.
+            EstimationError: all points in one place.
+
+        Source:
+            [Zhang 2006] sections 10 and 12.
         """
         neutral = self.examples.neutral.points
         known, positions = check_known(known, positions, len(neutral))
@@ -173,8 +188,13 @@ class Synthesizer:
             motion: of the head, from the neutral photo to the picture; none unless given.
             size: width and height of the picture, px; the neutral photo's unless given.
             out: memory to draw into.
-        Raises: InputError: shapes, NaN. EstimationError: all points in one place.
-        Source: Z06 sections 6 and 7.
+
+        Raises:
+            InputError: shapes, NaN.
+            EstimationError: all points in one place.
+
+        Source:
+            [Zhang 2006] sections 6 and 7.
         """
         subregions = self.examples.subregions
         apart = apart_from(self.examples, points)

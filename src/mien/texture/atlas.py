@@ -17,7 +17,9 @@ def atlas_surface(
     """The surface under every texel of the mesh's own texture coordinates.
 
     Where charts lie over each other, the first triangle counts.
-    Raises: InputError: a mesh without texture coordinates.
+
+    Raises:
+        InputError: a mesh without texture coordinates.
     """
     if len(mesh.uv_triangles) == 0:
         raise InputError("mesh", "one with texture coordinates", "one without")
@@ -32,7 +34,9 @@ def fill_gutters(pixels: Array, inside: Bool[Array, "h w"]) -> Array:
     """Colours continued beyond the charts, so that filtered lookups at their edges see no seam.
 
     Every pixel outside takes the colour of the nearest one inside, (H, W, C) of the same type.
-    Raises: InputError: nothing is inside.
+
+    Raises:
+        InputError: nothing is inside.
     """
     import cv2
 

@@ -48,7 +48,7 @@ def blend_views(
     certainty_power: float = 1.0,
     fade: tuple[float, float] = FADE,
 ) -> Blend:
-    """The convex combination of the photos on every texel (P02 sec. 5.2.1).
+    """The convex combination of the photos on every texel ([Pighin 2002] sec. 5.2.1).
 
     Args:
         gains: (K, 3) factors on each photo's colours; 1 when None.

@@ -26,8 +26,10 @@ class Cylinder:
     """An upright cylinder.
 
     Attributes:
-        axis_x, axis_z: mm, where its axis meets the plane y = 0.
-        bottom, top: mm, the heights where v is 0 and 1.
+        axis_x: mm, where its axis meets the plane y = 0.
+        axis_z: mm, where its axis meets the plane y = 0.
+        bottom: mm, the heights where v is 0 and 1.
+        top: mm, the heights where v is 0 and 1.
     """
 
     axis_x: float
@@ -48,7 +50,9 @@ def fit_cylinder(mesh: Mesh, *parts: str) -> Cylinder:
 
     The axis goes through the middle of the box around their upper half, which the neck and
     shoulders leave alone.
-    Raises: InputError: no triangles.
+
+    Raises:
+        InputError: no triangles.
     """
     names = parts or (("skin",) if "skin" in mesh.part_names else mesh.part_names)
     used = np.unique(mesh.triangles[mesh.triangles_of(*names)])
@@ -72,10 +76,13 @@ def cylinder_surface(
     """The first surface that rays from the cylinder towards its axis meet.
 
     Args:
-        width, height: texels.
+        width: texels.
+        height: texels.
         parts: names of the parts that can be met; all by default.
-    Source: P02 sec. 5.2.2, step 2. The intersection of ray and triangle is exact; only triangles
-        whose range of angle and height holds the ray are tried.
+
+    Source:
+        [Pighin 2002] sec. 5.2.2, step 2. The intersection of ray and triangle is exact; only
+        triangles whose range of angle and height holds the ray are tried.
     """
     chosen = np.arange(len(mesh.triangles)) if parts is None else mesh.triangles_of(*parts)
     points = mesh.vertices - [cylinder.axis_x, 0, cylinder.axis_z]

@@ -27,8 +27,10 @@ def estimate_gains(
 
     Args:
         surface: a coarse map will do.
-    Returns: factors whose product over the photos is 1 in each channel. 1 for a photo that overlaps
-        with no other.
+
+    Returns:
+        factors whose product over the photos is 1 in each channel. 1 for a photo that overlaps with
+        no other.
 
     The logarithms of the factors fit the medians of the log ratios of all overlapping pairs, in the
     least-squares sense, weighted by the overlap.

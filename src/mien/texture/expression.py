@@ -38,7 +38,8 @@ class ExpressionLook:
     """What the photos of an expression show.
 
     Attributes:
-        colours: (H, W, 3) float32, 0 to 255. share: (H, W) in [0, 1], how far they count.
+        colours: (H, W, 3) float32, 0 to 255.
+        share: (H, W) in [0, 1], how far they count.
         seen: (H, W) in [0, 1], how far the photos themselves show them.
         gains: (K, 3) what each photo's colours were multiplied by.
     """
@@ -80,10 +81,11 @@ def look_at_expression(
     """What photos show of an expression on the head's own texture map.
 
     Args:
-        mesh: as fitted to the photos. surface: its atlas_surface, (H, W).
+        mesh: as fitted to the photos.
+        surface: its atlas_surface, (H, W).
         below: (H, W, 3) neutral's texture: exposures are matched to it.
         within: (V,) in [0, 1], where the head may look different from neutral, eyes and teeth
-            included: P02's facial mask (sec. 6.1.1); hair and neck are the same for all.
+            included: [Pighin 2002]'s facial mask (sec. 6.1.1); hair and neck are the same for all.
         inside: (V,) in [0, 1], skin behind lips and lids.
     """
     solid = mesh.submesh(
@@ -132,7 +134,9 @@ def _enlarged(camera: Camera, photo: UInt8[Array, "h w 3"]) -> tuple[Camera, UIn
 
 def _ramp(seen: Blend, outer: Bool[Array, "h w"], surface: SurfaceMap) -> Float[Array, "h w"]:
     """(H, W) from 0 where the photos end to 1: wide, for light and exposure differ a little. At
-    lips, lids and nostrils, whose surroundings are seen from all sides, they do not end."""
+
+    lips, lids and nostrils, whose surroundings are seen from all sides, they do not end.
+    """
     import cv2
 
     size = 2 * round(_SLIT_MM / surface.texel_mm) + 1
@@ -146,7 +150,9 @@ def _spread(
     seen: Blend, texels: Bool[Array, "h w"], reach: float
 ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
     """Colours of a part's texels, (N, 3), and how far they count, (N,): where they are seen, and
-    fading with the distance from there, for what is a little aside comes into view, too."""
+
+    fading with the distance from there, for what is a little aside comes into view, too.
+    """
     import cv2
 
     rows, columns = (np.flatnonzero(texels.any(axis=axis)) for axis in (1, 0))

@@ -1,4 +1,4 @@
-"""Photos to one texture: the view-independent texture map of P02 sec. 5.2.2."""
+"""Photos to one texture: the view-independent texture map of [Pighin 2002] sec. 5.2.2."""
 
 from __future__ import annotations
 
@@ -83,7 +83,8 @@ def extract_texture(
 
     Args:
         mesh: as it was fitted to the photos.
-        cameras, photos: K of each, of the same sizes.
+        cameras: K of each, of the same sizes.
+        photos: K of each, of the same sizes.
         surface: which texels to colour (cylinder_surface or atlas_surface of this mesh).
         feather_mm: width of the ramp that ends each photo's part, along the surface.
         certainty_power: weights are F_k P_k^power; more makes the best photo win more clearly.
@@ -93,10 +94,15 @@ def extract_texture(
         regions: (V,) soft masks by name (those of the generic head): hair, ears and neck are then
             filled each from itself, and the mouth's inside is dark red.
         find_subject: tell person from background in the photos; else trust the mesh's outline.
-    Raises: InputError: counts and sizes that differ. EstimationError: no photo sees the mesh.
-    Source: P02 sec. 5.2.1, 5.2.2. Differs: colours seen at a grazing angle fade into the filled
-        surroundings; the skin's holes are filled on the cylinder for any layout, so that no seam
-        shows; parts are done one by one (sec. 5.2.4).
+
+    Raises:
+        InputError: counts and sizes that differ.
+        EstimationError: no photo sees the mesh.
+
+    Source:
+        [Pighin 2002] sec. 5.2.1, 5.2.2. Differs: colours seen at a grazing angle fade into the
+        filled surroundings; the skin's holes are filled on the cylinder for any layout, so that no
+        seam shows; parts are done one by one (sec. 5.2.4).
     """
     job = _prepare(mesh, cameras, photos, surface, feather_mm, fill, find_subject)
     job = replace(job, certainty_power=certainty_power)

@@ -113,8 +113,11 @@ def mirror_difference(blend: Blend, other: Blend) -> Float[Array, "h w 3"]:
     """What to add to the other side's colours so that they go on where the photos end.
 
     Args:
-        blend: the photos on the coarse cylinder. other: their mirror image there.
-    Returns: (H, W, 3) float32: the difference where both are known, smoothed over 10 mm or so and
+        blend: the photos on the coarse cylinder.
+        other: their mirror image there.
+
+    Returns:
+        (H, W, 3) float32: the difference where both are known, smoothed over 10 mm or so and
         continued over the rest; light seldom falls alike on both sides.
     """
     import cv2
@@ -139,11 +142,14 @@ def make_backdrop(
     """The holes of the skin filled region by region, hair from hair and ears from ears.
 
     Args:
-        coarse: the skin on the cylinder. blend: the photos on it.
+        coarse: the skin on the cylinder.
+        blend: the photos on it.
         regions: (V,) soft masks by name; what they leave is filled from itself too. A region of
             which the photos show next to nothing counts among the rest; an ear that they do not
             show is filled from the skin.
-    Raises: InputError: a mask that does not fit the mesh.
+
+    Raises:
+        InputError: a mask that does not fit the mesh.
     """
     left = np.ones(len(mesh.vertices))
     regions = _with_hair(mesh, regions)

@@ -17,7 +17,8 @@ class PartStyle:
 
     Attributes:
         photos: "blend" all of them, take the "best" one and the others only where it sees nothing
-            (P02 sec. 5.2.4: what moves or is half hidden comes from one photo), or "none".
+            ([Pighin 2002] sec. 5.2.4: what moves or is half hidden comes from one photo), or
+            "none".
         fill: what no photo shows is continued from the "surface" around it, takes the "white" of
             what is seen, or the "default" colour.
         default: 8-bit sRGB, where photos say nothing.
@@ -38,8 +39,8 @@ _TEETH = PartStyle("best", "default", (74, 67, 60), feather_mm=1.0)
 
 # The defaults are plain: sclera, mucosa and lashes as photographs usually show them. Teeth and
 # tongue that no photo shows are behind closed lips: they get enamel and mucosa in deep shadow, for
-# P02 darkens them with the mouth's opening (sec. 5.2.4) and white ones would gleam through the
-# slightest gap between the lips.
+# [Pighin 2002] darkens them with the mouth's opening (sec. 5.2.4) and white ones would gleam
+# through the slightest gap between the lips.
 STYLES = {
     "skin": SKIN,
     "left_eyeball": _EYEBALL,

@@ -57,7 +57,9 @@ def subject_mask(
 
 def _outline(mesh: Mesh, camera: Camera) -> tuple[int, int, int, int] | None:
     """Left, top, right, bottom (px) of what is to be looked at: the mesh and some space around
-    it; None when it is not in the photo."""
+
+    it; None when it is not in the photo.
+    """
     used = np.unique(mesh.triangles)
     in_camera = camera.to_camera(mesh.vertices[used])
     if not (in_camera[:, 2] > 0).all():
@@ -94,7 +96,9 @@ def _cut(image: Array, inside: Array, strip: float) -> Bool[Array, "h w"]:
 
 def _contrast(image: Array, inside: Array, strip: float) -> Array:
     """How unlike the colours inside and outside the outline are around each pixel; 0 where only
-    one of them is near."""
+
+    one of them is near.
+    """
     import cv2
 
     deep = cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, 5)

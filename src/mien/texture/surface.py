@@ -48,7 +48,8 @@ def surface_from(
 ) -> SurfaceMap:
     """The surface under texels whose triangles and places in them are known.
 
-    Raises: InputError: no two neighbouring texels.
+    Raises:
+        InputError: no two neighbouring texels.
     """
     points, normals = _points_and_normals(mesh, triangle_ids, barycentrics, np.s_[:])
     texel_mm = _texel_mm(points, triangle_ids)
@@ -93,7 +94,9 @@ def mirrored(surface: SurfaceMap, mesh: Mesh, mirror: Int[Array, " v"]) -> Surfa
 
     Args:
         mirror: (V,) index of each vertex's left-right partner.
-    Raises: InputError: a mirror map of another mesh.
+
+    Raises:
+        InputError: a mirror map of another mesh.
 
     Normals are those of the other side too, so that visibility and certainty are judged there.
     """

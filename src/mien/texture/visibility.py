@@ -32,8 +32,8 @@ class View:
         camera: of the photo as it is here (perhaps smaller than the original).
         photo: (H, W, 3) uint8.
         depth: (H, W) float32 mm, of the nearest surface that hides others; infinite beside it.
-        usable: (H, W) bool: pixels that show the head for certain: not the background, not so
-            near an outline that a small error of the shape puts something else there.
+        usable: (H, W) bool: pixels that show the head for certain: not the background, not so near
+            an outline that a small error of the shape puts something else there.
     """
 
     camera: Camera
@@ -66,7 +66,7 @@ def prepare_view(
     edge_mm: float = 1.0,
     hidden_mm: float = 3.0,
 ) -> View:
-    """The photo with its depth map (the Z-buffer of P02 sec. 5.2.1).
+    """The photo with its depth map (the Z-buffer of [Pighin 2002] sec. 5.2.1).
 
     Args:
         mesh: everything that hides something.
@@ -75,7 +75,9 @@ def prepare_view(
         outline_mm: how far from the mesh's outline in the photo a pixel has to be to be used.
         edge_mm: how far from an edge inside the outline, where one layer hides another.
         hidden_mm: how far from such an edge on the side of the layer behind.
-    Raises: InputError: no image, a camera of another size.
+
+    Raises:
+        InputError: no image, a camera of another size.
     """
     photo = check_image("photo", photo)
     if photo.shape[:2] != (camera.height, camera.width):
@@ -109,8 +111,10 @@ def sight(
         tolerance_mm: how far behind the depth map a visible point can lie; more where the surface
             is steep, by what its depth changes within a pixel.
         least_certainty: cosine below which a texel counts as turned away.
-    Source: P02 sec. 5.2.1 and 5.2.2, steps 1 and 2. A texel is visible when it is inside the photo,
-        faces the camera, lies on the depth map and falls on a usable pixel.
+
+    Source:
+        [Pighin 2002] sec. 5.2.1 and 5.2.2, steps 1 and 2. A texel is visible when it is inside the
+        photo, faces the camera, lies on the depth map and falls on a usable pixel.
     """
     check_positive("tolerance_mm", tolerance_mm)
     height, width = surface.triangle_ids.shape
@@ -138,7 +142,9 @@ def feather(
 
     Args:
         wrap: left and right ends touch.
-    Source: P02 sec. 5.2.2, step 1.
+
+    Source:
+        [Pighin 2002] sec. 5.2.2, step 1.
     """
     import cv2
 
@@ -190,7 +196,8 @@ def _trusted_pixels(
     """Pixels where a small error of the shape puts nothing else.
 
     Args:
-        outline_mm: from the mesh's outline. edge_mm: from an edge inside it, on either side.
+        outline_mm: from the mesh's outline.
+        edge_mm: from an edge inside it, on either side.
         hidden_mm: from such an edge on the side of what is hidden: there another layer's colours
             would land on a surface far behind it.
     """

@@ -1,1 +1,1 @@
-"""The performance in a video, by analysis and synthesis (P02 sec. 6)."""
+"""The performance in a video, by analysis and synthesis ([Pighin 2002] sec. 6)."""

@@ -27,7 +27,7 @@ from mien.track.photometric.samples import Answers
 from mien.track.state import Layout
 
 REGIONS = ("mouth", "eyes", "forehead")
-"""P02's three (sec. 6.2, fig. 9)."""
+"""[Pighin 2002]'s three (sec. 6.2, fig. 9)."""
 BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")
 """Units that a head with photographed expressions has in addition."""
 _STILL = ("tongueOut", "mouthClose", "jawForward")
@@ -43,8 +43,9 @@ class FaceParameters:
     """What a face does, as the numbers that are solved for.
 
     Attributes:
-        alpha: (R, K - 1) expression parameters by region, P02 eq. (4).
-        units: (U,) weights. gaze: (2,) radians, yaw to the subject's left and pitch up.
+        alpha: (R, K - 1) expression parameters by region, [Pighin 2002] eq. (4).
+        units: (U,) weights.
+        gaze: (2,) radians, yaw to the subject's left and pitch up.
     """
 
     alpha: Float[Array, "r l"]
@@ -68,7 +69,8 @@ class Anchor:
     """The rig's own face, around which the rest is linear: its contacts and shadows are kept.
 
     Attributes:
-        at: its parameters. face: what the rig makes of them.
+        at: its parameters.
+        face: what the rig makes of them.
     """
 
     at: FaceParameters
@@ -80,14 +82,18 @@ class TrackedFace:
 
     Attributes:
         layout: of its numbers.
-        basis: between blending weights and parameters, P02 eq. (4).
+        basis: between blending weights and parameters, [Pighin 2002] eq. (4).
         limits: what the parameters are to stay within.
-        painted: triangles that can be seen, with their textures; grey: these in grey.
+        painted: triangles that can be seen, with their textures.
+        grey: these in grey.
         compared: (F,) bool: those of the face, whose pixels count.
         moves: (P, V, 3) mm by which a step of 1 in each parameter moves each vertex.
-        answers: which unknowns concern which triangles; pose_answers: of the pose's alone.
+        answers: which unknowns concern which triangles.
+        pose_answers: of the pose's alone.
         region_of: (F,) the region that each triangle belongs to most; -1 for none.
-    Raises: InputError: as Rig; an unknown region or unit.
+
+    Raises:
+        InputError: as Rig; an unknown region or unit.
     """
 
     def __init__(
@@ -144,7 +150,8 @@ class TrackedFace:
     def posed(self, anchor: Anchor, parameters: FaceParameters) -> PosedFace:
         """The face at other parameters near by: the anchor's and the sum of what they change.
 
-        Raises: InputError: not finite.
+        Raises:
+            InputError: not finite.
         """
         step = check_array("parameters", parameters.vector, (None,)) - anchor.at.vector
         if not step.any():
@@ -156,7 +163,7 @@ class TrackedFace:
         return PosedFace(vertices, weights, anchor.face.brightness, finite=False)
 
     def _expression_moves(self) -> list[Float[Array, "v 3"]]:
-        """P02 app. B.2: dm/dalpha = sum over k of Q(k, l) m_k, in each region by its mask."""
+        """[Pighin 2002] app. B.2: dm/dalpha = sum over k of Q(k, l) m_k, in each region by mask."""
         along = np.tensordot(self.basis.Q.T, self.rig.offsets, axes=1)
         return [mask[:, None] * move for mask in self._masks.T for move in along]
 

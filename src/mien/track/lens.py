@@ -28,7 +28,8 @@ def parse_lens(text: str, width: int, height: int) -> float:
     Millimetres are those of the lens that shows as much on 35 mm film, by the diagonal, as cameras
     state it; degrees are the angle of view across the picture's longer side.
 
-    Raises: InputError: anything else, and what no lens is: 0, 180 degrees and more.
+    Raises:
+        InputError: anything else, and what no lens is: 0, 180 degrees and more.
     """
     found = _WRITTEN.fullmatch(text)
     if found is None:
@@ -48,8 +49,11 @@ class LogFocal:
     """What is known of a focal length: its logarithm, normally distributed.
 
     Attributes:
-        mean: log of px. precision: one over the variance of the logarithm.
-    Raises: InputError: a precision that is not positive.
+        mean: log of px.
+        precision: one over the variance of the logarithm.
+
+    Raises:
+        InputError: a precision that is not positive.
     """
 
     mean: float

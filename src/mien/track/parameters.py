@@ -1,4 +1,4 @@
-"""P02's parameters p, and what is expected of them (sec. 6.1)."""
+"""[Pighin 2002]'s parameters p, and what is expected of them (sec. 6.1)."""
 
 from __future__ import annotations
 
@@ -14,13 +14,17 @@ from mien.track.photometric.image_jacobian import POSE_UNKNOWNS
 
 @dataclass(frozen=True)
 class Guess:
-    """P02's parameters p: where the head is and what the face does."""
+    """[Pighin 2002]'s parameters p: where the head is and what the face does."""
 
     pose: Pose
     face: FaceParameters
 
     def moved(self, step: Float[Array, " n"]) -> Guess:
-        """After a step in all unknowns: R <- R^ R (P02 app. B.2), everything else by addition."""
+        """After a step in all unknowns: R <- R^ R, everything else by addition.
+
+        Source:
+            [Pighin 2002] app. B.2.
+        """
         import cv2
 
         turned = cv2.Rodrigues(np.asarray(step[:3]))[0] @ self.pose.R

@@ -27,9 +27,11 @@ def smooth(track: Track, seconds: float) -> Track:
     stays as it was measured.
 
     Args:
-        seconds: standard deviation of the window; noise of independent frames falls to about
-            0.53 / sqrt(seconds * fps) of it.
-    Raises: InputError: 0 s or less.
+        seconds: standard deviation of the window; noise of independent frames falls to about 0.53 /
+            sqrt(seconds * fps) of it.
+
+    Raises:
+        InputError: 0 s or less.
     """
     check_positive("seconds", seconds)
     reach = _REACH * seconds + _EDGE
@@ -53,7 +55,9 @@ class LiveFilter:
 
     Attributes:
         lag: seconds.
-    Raises: InputError: 0 s or less.
+
+    Raises:
+        InputError: 0 s or less.
     """
 
     def __init__(self, lag: float) -> None:
@@ -92,7 +96,9 @@ def _line_shares(u: Float[Array, " n"]) -> Float[Array, " n"]:
 
     Args:
         u: (N,) times in standard deviations of the window, 0 among them.
-    Source: local linear regression: the weighted normal equations of a straight line.
+
+    Source:
+        local linear regression: the weighted normal equations of a straight line.
     """
     weights = np.exp(-0.5 * u * u)
     s0, s1, s2 = (float((weights * u**power).sum()) for power in range(3))
@@ -107,7 +113,9 @@ def _low_pass_shares(step: float) -> Float[Array, " 3"]:
 
     Args:
         step: time between the two values, in time constants.
-    Source: y' = (x - y) / lag, integrated over an x that goes straight from value to value.
+
+    Source:
+        y' = (x - y) / lag, integrated over an x that goes straight from value to value.
     """
     if step <= 0:
         return np.array([1.0, 0.0, 0.0])

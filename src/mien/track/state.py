@@ -56,11 +56,14 @@ class TrackState:
     """Head and face in one frame.
 
     Attributes:
-        R_cam_head: (3, 3). t_cam_head: (3,) mm.
+        R_cam_head: (3, 3).
+        t_cam_head: (3,) mm.
         weights: (R, K) blending weights by region; every row sums to 1.
         units: (U,) weights of face units.
         gaze: (2,) radians, yaw to the subject's left and pitch up.
-    Raises: InputError: shapes, not finite, no rotation.
+
+    Raises:
+        InputError: shapes, not finite, no rotation.
     """
 
     R_cam_head: Float[Array, "3 3"]
@@ -97,14 +100,17 @@ class TrackedFrame:
     """What one frame shows.
 
     Attributes:
-        frame: counted from 0. time: seconds.
-        status: how it was found. state: None where it is lost.
+        frame: counted from 0.
+        time: seconds.
+        status: how it was found.
+        state: None where it is lost.
         rms: grey levels (0 to 255), root mean square difference of the frame and the drawn face
             over the face, colours matched by gain and bias; NaN where it is lost.
         seen: share of the face mask that is not covered or outside of the frame, from 0 to 1.
         deviations: (C,) standard deviation of each of the layout's channels: how well the frame
             determines it. What the frame says nothing about has that of the prior.
-        gain, bias: (3,) frame = gain * drawn + bias, of colours from 0 to 255.
+        gain: (3,) frame = gain * drawn + bias, of colours from 0 to 255.
+        bias: (3,) frame = gain * drawn + bias, of colours from 0 to 255.
     """
 
     frame: int
@@ -124,8 +130,9 @@ class Track:
 
     Attributes:
         layout: of every frame's numbers.
-        width, height, focal_px: of the video's pictures, upright; the principal point is in their
-            middle.
+        width: of the video's pictures, upright; the principal point is in their middle.
+        height: as `width`.
+        focal_px: as `width`.
         fps: frames a second, their mean where it varies.
         frames: in the order of their times.
     """

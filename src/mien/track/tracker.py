@@ -1,4 +1,4 @@
-"""Frame after frame: prediction, fit, and finding the face again (P02 sec. 6.2)."""
+"""Frame after frame: prediction, fit, and finding the face again ([Pighin 2002] sec. 6.2)."""
 
 from __future__ import annotations
 
@@ -79,9 +79,14 @@ class Tracker:
         met_others: whether in a lost frame there was a face.
 
     Args:
-        width, height, focal_px: of the video's upright pictures.
-        model, starter: of this head and these units, if there are any already; a second each.
-    Raises: InputError: as Rig.
+        width: of the video's upright pictures.
+        height: of the video's upright pictures.
+        focal_px: of the video's upright pictures.
+        model: of this head and these units, if there are any already; a second each.
+        starter: of this head and these units, if there are any already; a second each.
+
+    Raises:
+        InputError: as Rig.
     """
 
     def __init__(
@@ -125,7 +130,8 @@ class Tracker:
 
         Args:
             pixels: sRGB; the whole picture, in its own size or smaller.
-            frame: its number. time: seconds.
+            frame: its number.
+            time: seconds.
             start: where a face that is found anew is; by default where the detector finds any.
         """
         camera, again = self._camera_of(pixels), frame % _LOOK_AROUND == 0
@@ -247,7 +253,7 @@ class Tracker:
         )
 
     def _predicted(self, time: float) -> Guess:
-        """Linearly from two frames (P02 sec. 6.2), the pose; what the face does stays."""
+        """Linearly from two frames ([Pighin 2002] sec. 6.2), the pose; what the face does stays."""
         last = self._past[-1]
         assert last.state is not None
         guess = self._guess(last.state)
@@ -295,7 +301,9 @@ class Tracker:
 
 def _unlike(fitted: Fitted | None, misfit_mm: float) -> float:
     """How far a face is from looking like the head and having its shape: in other light the first
-    tells less, in other expressions the second."""
+
+    tells less, in other expressions the second.
+    """
     return np.inf if fitted is None else (1 - fitted.agreement.likeness) * misfit_mm
 
 

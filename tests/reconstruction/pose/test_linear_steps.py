@@ -1,4 +1,4 @@
-"""Each of P02's steps against its own quadratic."""
+"""Each of [Pighin 2002]'s steps against its own quadratic."""
 
 from __future__ import annotations
 

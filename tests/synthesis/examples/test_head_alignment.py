@@ -1,4 +1,4 @@
-"""Head motion undone (Z06 sec. 12)."""
+"""Head motion undone ([Zhang 2006] sec. 12)."""
 
 from __future__ import annotations
 

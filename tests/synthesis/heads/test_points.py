@@ -1,4 +1,4 @@
-"""Feature points on heads (Z06 section 9)."""
+"""Feature points on heads ([Zhang 2006] section 9)."""
 
 from __future__ import annotations
 

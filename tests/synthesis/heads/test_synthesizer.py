@@ -1,4 +1,4 @@
-"""Expressions of heads from feature points in space (Z06 section 9)."""
+"""Expressions of heads from feature points in space ([Zhang 2006] section 9)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shares of examples by subregion (Z06 section 6)."""
+"""Shares of examples by subregion ([Zhang 2006] section 6)."""
 
 from __future__ import annotations
 

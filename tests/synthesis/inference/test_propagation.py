@@ -1,4 +1,4 @@
-"""Motion propagation (Z06 sec. 10)."""
+"""Motion propagation ([Zhang 2006] sec. 10)."""
 
 from __future__ import annotations
 

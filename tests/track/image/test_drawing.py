@@ -1,4 +1,4 @@
-"""The face drawn for comparison: P02 eq. (5), and the same picture as everywhere else."""
+"""The face drawn for comparison: [Pighin 2002] eq. (5), and the same picture as everywhere else."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ def test_a_strong_belief_holds(scene: Scene) -> None:
 
 
 def test_weights_out_of_range_are_held_back(scene: Scene) -> None:
-    """P02's D(p) against a belief of deviation 1, both pulling at neutral and joy alike."""
+    """[Pighin 2002]'s D(p) against a belief of deviation 1, both pulling at neutral."""
     blind = replace(scene, weights=np.zeros_like(scene.weights))
     mean = Guess(patterned.pose(), patterned.doing({"mouth": (1.4, 0.0)}))
     found = scene.model.basis.weights(solved(blind, mean).guess.face.alpha)

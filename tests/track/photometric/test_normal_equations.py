@@ -126,7 +126,7 @@ def test_downhill_leads_back(scene: Scene, unknown: int) -> None:
 
 
 def test_flows_are_those_of_the_projection(rng: np.random.Generator) -> None:
-    """P02 app. B: against differences of projected vertices."""
+    """[Pighin 2002] app. B: against differences of projected vertices."""
     model = patterned.model()
     scene = patterned.scene(GUESS)
     drawing = scene.draw(GUESS, layers=False)

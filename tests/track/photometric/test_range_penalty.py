@@ -1,4 +1,4 @@
-"""D(p): P02's formula, and its derivatives against differences."""
+"""D(p): [Pighin 2002]'s formula, and its derivatives against differences."""
 
 from __future__ import annotations
 

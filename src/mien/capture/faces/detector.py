@@ -43,7 +43,8 @@ class NoFaceError(EstimationError):
 class LandmarkDetector:
     """Finds a face and its landmarks. Use as a context manager, or call `close`.
 
-    Raises: MienError: a shared library of the system is missing; says which.
+    Raises:
+        MienError: a shared library of the system is missing; says which.
     """
 
     def __init__(self) -> None:
@@ -75,6 +76,7 @@ class LandmarkDetector:
         Args:
             photo: upright as far as its file tells.
             face: which one, counted from 1 from left to right in the photo.
+
         Raises:
             InputError: `face` is not positive, or there are fewer faces.
             NoFaceError: no face. EstimationError: one too small.

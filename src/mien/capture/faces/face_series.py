@@ -40,7 +40,8 @@ class FaceSeries:
     """The pictures that show the person's face, without their pixels.
 
     Attributes:
-        source: the video or the folder. is_video: which of both.
+        source: the video or the folder.
+        is_video: which of both.
         files: of a folder, each picture's file; of a video, empty.
         names: of the pictures: `frame_000123.png`, `smile.jpg`, or `joy/smile.jpg` in a folder of
             one folder an expression.
@@ -87,8 +88,11 @@ def find_faces(
         max_side: px; larger pictures are reduced to it.
         face: as for LandmarkDetector.detect, of photos; a video's is the largest.
         look: called with each picture that shows the face, as long as its pixels are there.
-    Raises: InputError, FileFormatError: no such source, damaged, not a video, no photo in it; a
-        `face` of a video. EstimationError: no picture shows a face.
+
+    Raises:
+        InputError: no such source, damaged, not a video, no photo in it; a `face` of a video.
+        FileFormatError: as InputError.
+        EstimationError: no picture shows a face.
     """
     kind, source = kind_of_source(source), Path(source)
     gathered = _Gathered(source, max_side, look or (lambda pixels, landmarks: None))
@@ -228,7 +232,8 @@ class _Gathered:
 def row_of(series: FaceSeries, what: str, option: str) -> int:
     """The row of a picture that a user names: a frame's number, a file's name, its stem.
 
-    Raises: InputError: there is none; several; one that shows no face.
+    Raises:
+        InputError: there is none; several; one that shows no face.
     """
     if series.is_video and what.isascii() and what.isdecimal():
         what = frame_name(int(what))
@@ -246,7 +251,8 @@ def row_of(series: FaceSeries, what: str, option: str) -> int:
 def rows_of(series: FaceSeries, what: str, option: str) -> list[int]:
     """As row_of, and all frames of a stretch where that is what the user names: `860-930`.
 
-    Raises: InputError: as row_of; a stretch without a picture that shows the face.
+    Raises:
+        InputError: as row_of; a stretch without a picture that shows the face.
     """
     stretch = re.fullmatch(r"(\d{1,9})-(\d{1,9})", what, re.ASCII)
     if not (series.is_video and stretch):

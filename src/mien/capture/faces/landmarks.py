@@ -60,7 +60,9 @@ def inside_picture(
     points: Float[Array, "n 2"], size: tuple[int, int] | Int[Array, " 2"]
 ) -> Bool[Array, " n"]:
     """Which points lie in a picture of this width and height; what a detector says of the others
-    is a guess."""
+
+    is a guess.
+    """
     inside: Array = np.all((points >= 0) & (points <= np.asarray(size)), axis=1)
     return inside
 

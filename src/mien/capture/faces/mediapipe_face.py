@@ -125,7 +125,8 @@ def yaw_pitch(R_cam_head: Float[Array, "3 3"]) -> tuple[float, float]:
 class FaceNetwork:
     """The network, loaded once (0.3 s). Use as a context manager, or call `close`.
 
-    Raises: MienError: a shared library of the system is missing; says which.
+    Raises:
+        MienError: a shared library of the system is missing; says which.
     """
 
     def __init__(self, model: Path) -> None:

@@ -13,6 +13,7 @@ _BLOCK = 8
 
 def face_sharpness(pixels: UInt8[Array, "h w 3"], points: Float[Array, "n 2"]) -> float:
     """Variance of the Laplacian over the face, at one size for all and free of contrast, less where
+
     the edges are those of the coder's blocks.
 
     Args:

@@ -20,7 +20,8 @@ _SPACE = slice(16, 20)
 def to_eight_bits(image: Image, notes: list[str]) -> Image:
     """The picture in mode L, RGB, CMYK or LAB: 8 bits a sample, no palette, no alpha.
 
-    Raises: UnreadSamplesError: samples whose range is unknown (floating point, 32 bits).
+    Raises:
+        UnreadSamplesError: samples whose range is unknown (floating point, 32 bits).
     """
     from PIL import Image
 

@@ -53,7 +53,8 @@ def to_srgb(codes: UInt16[Array, "h w 3"], transfer: int, primaries: int) -> UIn
 
     Args:
         codes: R'G'B' over the full range of 16 bits.
-        transfer: PQ or HLG. primaries: by their code in ISO/IEC 23091-2; BT.2020's where unknown.
+        transfer: PQ or HLG.
+        primaries: by their code in ISO/IEC 23091-2; BT.2020's where unknown.
     """
     tables = _tables(transfer)
     matrix = _TO_SRGB.get(primaries, _TO_SRGB[_BT2020]).astype(np.float32)

@@ -21,7 +21,8 @@ _PRECISION = 42
 def eight_bits_if_deep(image: Image) -> Image | None:
     """The picture in mode RGB, if it is such a one in colour; None for every other.
 
-    Raises: UnreadSamplesError: it has transparent parts, or is not read here.
+    Raises:
+        UnreadSamplesError: it has transparent parts, or is not read here.
     """
     import cv2
     from PIL import Image

@@ -48,6 +48,7 @@ def opened_image(path: str | Path, notes: list[str], *, kind: str = "a photo") -
     Args:
         notes: gains what its decoder finds odd.
         kind: what the file should be, for messages.
+
     Raises:
         InputError: there is no such file, it is a pipe, a device or a folder, or may not be read.
         FileFormatError: not an image of a kind that is read, empty, damaged, too large.

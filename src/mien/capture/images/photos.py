@@ -78,6 +78,7 @@ def load_photo(path: str | Path, *, max_side: int = MAX_SIDE) -> Photo:
     Args:
         path: JPEG, PNG, TIFF, WebP, BMP, HEIC, AVIF, GIF, JPEG 2000 or PPM, whatever its name.
         max_side: limit in px on the longer side.
+
     Raises:
         InputError: there is no such file, it may not be read, `max_side` is not positive.
         FileFormatError: not an image, empty, damaged, too large, of an unsupported sample type.

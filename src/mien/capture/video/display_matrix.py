@@ -23,7 +23,8 @@ class Display:
 
     Attributes:
         transposed: rows become columns, before anything else.
-        flip_x, flip_y: then mirrored from left to right, from top to bottom.
+        flip_x: then mirrored from left to right, from top to bottom.
+        flip_y: then mirrored from left to right, from top to bottom.
     """
 
     transposed: bool = False

@@ -85,7 +85,8 @@ def name_expressions(
     """A name for each by what changes most: "smile"; where that is taken, "smile-brows_up".
 
     Args:
-        blendshapes: scores of N expressions. neutral: those of the face at rest.
+        blendshapes: scores of N expressions.
+        neutral: those of the face at rest.
     """
     names: list[str] = []
     for scores in blendshapes:

@@ -1,5 +1,7 @@
 """Which frames of a clip make good photos of a head at rest: sharp, alike in expression, unlike in
-pose."""
+
+pose.
+"""
 
 from __future__ import annotations
 

@@ -24,7 +24,8 @@ class Picture:
     """One frame, converted.
 
     Attributes:
-        frame: counted from 0. seconds: since the clip's beginning.
+        frame: counted from 0.
+        seconds: since the clip's beginning.
         pixels: (H, W, 3) sRGB, upright.
     """
 
@@ -44,6 +45,7 @@ def frames_ahead(
     Args:
         start: the first that is wanted; those before are decoded but not converted.
         max_side: as for `Frame.pixels`.
+
     Raises, while iterating: as `Video.frames`.
     """
     with read_ahead(_pictures(video, start, max_side), ahead) as pictures:

@@ -44,7 +44,9 @@ class LiveSource(Protocol):
     """Where pictures come from in real time.
 
     Attributes:
-        width, height: of the pictures, upright, px. fps: frames a second, as stated.
+        width: of the pictures, upright, px.
+        height: of the pictures, upright, px.
+        fps: frames a second, as stated.
         dropped: how many pictures came while nobody was ready for them.
         notes: what was odd; grows while frames are read.
     """
@@ -66,8 +68,12 @@ class PacedVideo:
     """A video file that stands in for a camera: a picture is there when its time has come.
 
     Args:
-        clock, sleep: seconds now, and waiting for so many.
-    Raises: InputError, FileFormatError: as `Video.frames`.
+        clock: seconds now, and waiting for so many.
+        sleep: seconds now, and waiting for so many.
+
+    Raises:
+        InputError: as `Video.frames`.
+        FileFormatError: as `Video.frames`.
     """
 
     def __init__(

@@ -32,7 +32,9 @@ def turn_upright(video: Video, detector: LandmarkDetector) -> bool:
     """Have the video's pictures turned, with a note, if the head in them is not upright; whether.
 
     The first ten seconds are looked at, as closely as a photo, until three frames agree.
-    Raises: as Video.frames.
+
+    Raises:
+        as Video.frames.
     """
     quarters = _quarters(video, detector)
     if not quarters:

@@ -60,6 +60,7 @@ def pick_frames(
         count: of neutral as many at most; fewer when the head turns little.
         expressions: as many others at most; None takes what differs, up to 8; 0 neutral alone.
         progress: told (done, total) frames of both passes; the total is an estimate.
+
     Raises:
         InputError: no such file, not readable, `count` not positive.
         FileFormatError: not a video, or no frame in it.

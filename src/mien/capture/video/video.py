@@ -113,7 +113,8 @@ class VideoFacts:
     """What a file states of its pictures, and its first one shows.
 
     Attributes:
-        width, height: upright, px.
+        width: upright, px.
+        height: upright, px.
         fps: frames a second, their mean where it varies.
         frames: how many; 0: unknown.
         seconds: how long; None: unknown.
@@ -143,7 +144,9 @@ class Video:
     def frames(self) -> Generator[Frame]:
         """Every frame in order of display. A stream that breaks half-way ends there, with a note.
 
-        Raises: InputError, FileFormatError: not a video, no frames, too large.
+        Raises:
+            InputError: not a video, no frames, too large.
+            FileFormatError: not a video, no frames, too large.
         """
         import av
 

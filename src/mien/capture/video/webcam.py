@@ -65,8 +65,12 @@ class Webcam:
 
     Args:
         number: 0 is the system's first.
-        opened: gives the camera. clock: seconds now. patience: seconds.
-    Raises: InputError: no such camera, or none that delivers pictures.
+        opened: gives the camera.
+        clock: seconds now.
+        patience: seconds.
+
+    Raises:
+        InputError: no such camera, or none that delivers pictures.
     """
 
     def __init__(

@@ -62,8 +62,9 @@ def write_examples(
 
     Args:
         why: the reason for each example, by name.
-    Raises: InputError: the place holds something else or cannot be written; a name that is no
-        file's.
+
+    Raises:
+        InputError: the place holds something else or cannot be written; a name that is no file's.
     """
     with atomic_folder(folder, replaces=is_example_folder, stay=()) as temporary:
         write_example_files(temporary, example_set, why=why)
@@ -104,7 +105,9 @@ def check_example_place(folder: str | Path, *, read: Iterable[str | Path] = ()) 
 
     Args:
         read: what the examples are made from, which must not lie in the folder.
-    Raises: InputError.
+
+    Raises:
+        InputError: bad input.
     """
     check_folder_place(folder, replaces=is_example_folder, read=read)
 
@@ -114,8 +117,11 @@ def load_examples(folder: str | Path, *, layout: FeatureLayout | None = None) ->
 
     Args:
         layout: of the points; mien's own unless given.
-    Raises: InputError: no such folder. FileFormatError: something in it is missing, damaged, of
-        another layout or newer than this program; the message names the file and the place in it.
+
+    Raises:
+        InputError: no such folder.
+        FileFormatError: something in it is missing, damaged, of another layout or newer than this
+            program; the message names the file and the place in it.
     """
     folder = named_path("examples", folder, "an example folder that `mien examples` made")
     layout = layout or load_feature_layout()

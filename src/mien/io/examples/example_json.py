@@ -67,7 +67,8 @@ def examples_to_json(example_set: ExampleSet, why: Mapping[str, str]) -> dict[st
 def check_layout(data: dict[str, Any], layout: FeatureLayout) -> None:
     """The points must be those of the layout, in its order: shares and statistics rely on it.
 
-    Raises: Broken: other ones.
+    Raises:
+        Broken: other ones.
     """
     name = as_text(need(data, "name", "layout"), "layout.name")
     points = as_list(need(data, "points", "layout"), "layout.points")
@@ -85,7 +86,9 @@ def points_from_json(
 
     Args:
         side: px, the photo's longer one; a point of a face that it cuts lies within one more.
-    Raises: Broken: one is missing, unknown or no place.
+
+    Raises:
+        Broken: one is missing, unknown or no place.
     """
     named = as_object(value, place, layout.names)
     points = np.empty((len(layout.names), 2))

@@ -29,8 +29,11 @@ def write_weights(
     """Writes the shares of each subregion, the greatest first, and how far it leaves the hull.
 
     Args:
-        coefficients, hull_px: as `Synthesis` has them.
-    Raises: InputError: shapes, NaN, the place.
+        coefficients: as `Synthesis` has them.
+        hull_px: as `Synthesis` has them.
+
+    Raises:
+        InputError: shapes, NaN, the place.
     """
     write_shares(
         path,
@@ -59,7 +62,9 @@ def write_shares(
         subregions: their names.
         coefficients: share of each example in each subregion.
         hull: how far each subregion leaves the hull, by a key that says in which unit.
-    Raises: InputError: shapes, NaN, the place.
+
+    Raises:
+        InputError: shapes, NaN, the place.
     """
     shares = check_array("coefficients", coefficients, (len(subregions), len(sources)))
     rows = zip(subregions, shares, strict=True)

@@ -51,7 +51,8 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
 
     Folders above are made. The temporary name has another suffix: say the format when writing.
 
-    Raises: InputError: a folder or a device is in the way, the place cannot be written.
+    Raises:
+        InputError: a folder or a device is in the way, the place cannot be written.
     """
     target = _target(path)
     with _placing(path, target):
@@ -72,7 +73,8 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
 def check_file_place(path: str | Path) -> None:
     """Refuse, before any work is done, a place that `atomic_file` could not take.
 
-    Raises: InputError: as atomic_file.
+    Raises:
+        InputError: as atomic_file.
     """
     target = _target(path)
     with _placing(path, target):
@@ -87,7 +89,9 @@ def check_files_apart(written: Iterable[str | Path], read: Iterable[str | Path] 
         written: files that a run writes.
         read: files that it reads; of a folder all that mien wrote there, or all that there is where
             no list tells (mien.io.files.manifest).
-    Raises: InputError: names the place.
+
+    Raises:
+        InputError: names the place.
     """
     taken = [Path(path) for path in read]
     for path in map(Path, written):
@@ -106,7 +110,9 @@ def check_side_file(path: str | Path, main: str | Path) -> None:
     Args:
         path: whose name nobody gave: it follows from the main file's.
         main: where that is there, it brought along what lies beside it.
-    Raises: InputError: names both.
+
+    Raises:
+        InputError: names both.
     """
     if os.path.lexists(path) and not os.path.lexists(main):
         raise InputError(path, f"a free place for what goes beside {main}", "another file there")
@@ -129,9 +135,11 @@ def atomic_folder(
         path: the folder; those above it are made.
         replaces: says of a folder already there whether it may be replaced. An empty one may.
         read: what the run reads and must not lie in the folder.
-        stay: given, what mien did not write into the old folder is kept in the new
-            one (io.files.manifest); at these paths, which people may change, in its place.
-    Raises: InputError: as check_folder_place; the place cannot be written.
+        stay: given, what mien did not write into the old folder is kept in the new one
+            (io.files.manifest); at these paths, which people may change, in its place.
+
+    Raises:
+        InputError: as check_folder_place; the place cannot be written.
     """
     check_folder_place(path, replaces=replaces, read=read)
     target = _target(path)
@@ -160,7 +168,8 @@ def check_folder_place(
 ) -> None:
     """Refuse, before any work is done, a place that `atomic_folder` could not take.
 
-    Raises: InputError: a file is in the way, a folder that holds something else or what is read.
+    Raises:
+        InputError: a file is in the way, a folder that holds something else or what is read.
     """
     target = _target(path)
     put_back(target)

@@ -30,9 +30,13 @@ def write_frames(
             taken one at a time.
         name: what the pictures' names begin with.
         read: what the frames are made from, which must not lie in the folder.
-    Returns: how many frames were written.
-    Raises: InputError: a folder with other things in it, no frame, a frame of another size, a name
-        that is none, a place that cannot be written.
+
+    Returns:
+        how many frames were written.
+
+    Raises:
+        InputError: a folder with other things in it, no frame, a frame of another size, a name that
+            is none, a place that cannot be written.
     """
     if not re.fullmatch(r"[\w-]+", name):
         raise InputError("name", "letters, digits, - and _", repr(name))
@@ -53,7 +57,8 @@ def write_frames(
 def check_frames_place(path: str | Path, *, read: Iterable[str | Path] = ()) -> None:
     """Refuse, before any frame is made, a folder that write_frames could not take.
 
-    Raises: InputError: a file is in the way, a folder that holds other things or what is read.
+    Raises:
+        InputError: a file is in the way, a folder that holds other things or what is read.
     """
     check_folder_place(path, replaces=_holds_frames, read=read)
 

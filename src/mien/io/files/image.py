@@ -35,7 +35,9 @@ def save_image(path: str | Path, pixels: UInt8[Array, "h w c"], *, quality: int 
     Args:
         pixels: (h, w, 3) sRGB or (h, w, 4) with alpha last, not premultiplied.
         quality: of a JPEG, 1 to 100.
-    Raises: InputError: an unknown suffix, transparency into a JPEG, a place that cannot be written.
+
+    Raises:
+        InputError: an unknown suffix, transparency into a JPEG, a place that cannot be written.
     """
     kind = image_kind(path)
     if kind == "JPEG" and pixels.ndim == 3 and pixels.shape[2] == 4:
@@ -86,7 +88,8 @@ def load_image(path: str | Path) -> UInt8[Array, "h w 3"]:
 
     Photos of unknown making are read by `mien.capture` instead.
 
-    Raises: FileFormatError: missing, not a file, not such an image.
+    Raises:
+        FileFormatError: missing, not a file, not such an image.
     """
     try:
         with opened_image(path, [], kind="an image") as image:

@@ -83,9 +83,12 @@ def keep_own_files(old: Path, new: Path, *, stay: Collection[str] = ()) -> Seen:
     and somebody changed, or whose names the new folder has taken, go to `kept/`.
 
     Args:
-        old: may be missing. new: with its manifest written.
+        old: may be missing.
+        new: with its manifest written.
         stay: paths that people are meant to change: theirs stay, in the place of mien's.
-    Returns: what there was, for keep_late_files.
+
+    Returns:
+        what there was, for keep_late_files.
     """
     if not old.exists():
         return frozenset()
@@ -102,7 +105,9 @@ def keep_late_files(old: Path, new: Path, seen: Seen) -> None:
     """Bring what came into a folder, or changed there, while its own files were brought.
 
     Args:
-        old: moved aside. new: in its place. seen: by keep_own_files.
+        old: moved aside.
+        new: in its place.
+        seen: by keep_own_files.
     """
     late = {name for name, *_ in _seen(old) - seen}
     for name in late.intersection(own_files(old)) if late else ():

@@ -49,9 +49,13 @@ def write_video(
             column: colour at half resolution wants pairs.
         fps: frames a second.
         quality: the encoder's constant rate factor; lower is better and larger, 18 looks exact.
-    Returns: how many frames were written.
-    Raises: InputError: another suffix, no frame, a frame of another size, alpha into an .mp4, no
-        encoder in this build of FFmpeg, a place that cannot be written.
+
+    Returns:
+        how many frames were written.
+
+    Raises:
+        InputError: another suffix, no frame, a frame of another size, alpha into an .mp4, no
+            encoder in this build of FFmpeg, a place that cannot be written.
     """
     import av
 
@@ -89,7 +93,8 @@ def write_video(
 def check_video_place(path: str | Path) -> None:
     """Refuse, before any frame is made, a place that write_video would not take.
 
-    Raises: InputError: another suffix, a place that cannot be written.
+    Raises:
+        InputError: another suffix, a place that cannot be written.
     """
     _check_suffix(path)
     check_file_place(path)

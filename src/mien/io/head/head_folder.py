@@ -52,7 +52,9 @@ def save_head(
         head: what `load_head` gives back, to float32.
         photos: name and (h, w, 3) pixels, orientation applied; taken one at a time.
         annotations: contents of `annotations/NAME.json` by NAME, as they were used.
-    Raises: InputError: the place holds something else or cannot be written; a photo's name.
+
+    Raises:
+        InputError: the place holds something else or cannot be written; a photo's name.
     """
     with head_place(folder) as temporary:
         write_head(head, temporary, photos=photos, annotations=annotations)
@@ -67,7 +69,9 @@ def head_place(
 
     Args:
         read: what the head is made from, which must not lie in the folder.
-    Raises: InputError: as save_head.
+
+    Raises:
+        InputError: as save_head.
     """
     return atomic_folder(folder, replaces=is_head_folder, read=read, stay=MASK_FILES)
 
@@ -109,8 +113,10 @@ def check_head_place(folder: str | Path, *, read: Iterable[str | Path] = ()) -> 
 def load_head(folder: str | Path) -> Head:
     """The head in a folder.
 
-    Raises: InputError: no such folder. FileFormatError: something in it is missing, damaged or
-        newer than this program; the message names the file and the place in it.
+    Raises:
+        InputError: no such folder.
+        FileFormatError: something in it is missing, damaged or newer than this program; the message
+            names the file and the place in it.
     """
     folder = named_path("head", folder, "a head folder that `mien build` made")
     put_back(folder)
@@ -176,7 +182,8 @@ def _check_textures(
 ) -> None:
     """Those that are mixed must be of one size, neutral's among them.
 
-    Raises: FileFormatError: names the file. Broken: neutral has none.
+    Raises:
+        FileFormatError: names the file. Broken: neutral has none.
     """
     neutral = textures.get(shapes[NEUTRAL].texture)
     if neutral is None:

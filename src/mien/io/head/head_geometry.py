@@ -26,8 +26,10 @@ class HeadGeometry:
     """The arrays of a head.
 
     Attributes:
-        mesh: over the neutral shape. shapes: (V, 3) mm by expression.
-        uncertainty_mm: (V,). unit_offsets: (K, V, 3) mm.
+        mesh: over the neutral shape.
+        shapes: (V, 3) mm by expression.
+        uncertainty_mm: (V,).
+        unit_offsets: (K, V, 3) mm.
     """
 
     mesh: Mesh
@@ -42,9 +44,12 @@ def read_geometry(
     """The arrays in a file.
 
     Args:
-        expressions: names, neutral among them. units: how many.
-    Raises: FileFormatError: names the array: missing, of another kind or shape, an index or a
-        number out of range, a part without extent.
+        expressions: names, neutral among them.
+        units: how many.
+
+    Raises:
+        FileFormatError: names the array: missing, of another kind or shape, an index or a number
+            out of range, a part without extent.
     """
     with ArrayFile(path) as arrays:
         neutral = arrays.numbers(f"vertices/{NEUTRAL}", (None, 3), most=MAX_MM)
@@ -96,7 +101,8 @@ def _check_extent(path: Path, name: str, mesh: Mesh, vertices: Float[Array, "v 3
 def check_names(mesh: Mesh, unit_names: tuple[str, ...]) -> None:
     """Parts and units of a head of the generic topology are looked up by the generic names.
 
-    Raises: Broken: other ones, or in another order.
+    Raises:
+        Broken: other ones, or in another order.
     """
     generic = load_generic_head()
     if mesh.vertices.shape != generic.mesh.vertices.shape:

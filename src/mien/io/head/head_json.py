@@ -116,7 +116,9 @@ def views_from_json(data: Json, place: str) -> tuple[FittedView, ...]:
 
 def motion_from_json(data: Json, place: str) -> Json:
     """Units and gaze of an expression, as fields of head.Expression; a head of an older mien
-    has none. Raises: Broken."""
+
+    has none. Raises: Broken.
+    """
     units = as_object(data.get("units", {}), f"{place}.units")
     low, high = UNIT_RANGE
     weights = {

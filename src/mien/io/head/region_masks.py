@@ -37,7 +37,9 @@ def read_masks(folder: Path, mesh: Mesh) -> dict[str, Float[Array, " v"]]:
     """The masks in a head folder, (V,) in [0, 1]; those whose file is missing are left out.
 
     Pictures of any size will do, as long as they have the texture's layout.
-    Raises: FileFormatError: a file that is no picture.
+
+    Raises:
+        FileFormatError: a file that is no picture.
     """
     files = {name: folder / FOLDER / f"{name}.png" for name in MASKS}
     return {

@@ -27,8 +27,11 @@ def read_points(
     Args:
         path: `.json`, as `read_points_json` has it; `.tem` of Psychomorph or WebMorph; `.pts` of
             iBUG's 68 points. Of the last two, those that the layout shares are taken.
-    Raises: InputError: another ending, a file that cannot be read. FileFormatError: not what its
-        ending says, another layout; says where. OtherPointsError: another template.
+
+    Raises:
+        InputError: another ending, a file that cannot be read.
+        FileFormatError: not what its ending says, another layout; says where.
+        OtherPointsError: another template.
     """
     path = Path(path)
     read = _READERS[check_points_kind(path)]
@@ -49,7 +52,9 @@ def write_points(path: str | Path, layout: FeatureLayout, points: Float[Array, "
 
     Args:
         path: `.json`, by name; `.tem`, in the layout's order; `.pts`, iBUG's 68.
-    Raises: InputError: another ending, shape, NaN, the place.
+
+    Raises:
+        InputError: another ending, shape, NaN, the place.
     """
     path = Path(path)
     _WRITERS[check_points_kind(path)](

@@ -35,9 +35,11 @@ def read_points_json(
 
     Args:
         axes: 3 for points of a head: [X, Y, Z] mm, head space.
-    Raises: InputError: the file cannot be read. FileFormatError: not JSON, another layout's
-        points, an unknown name (suggests the nearest), anything but so many finite numbers a
-        point, no point at all; says where.
+
+    Raises:
+        InputError: the file cannot be read.
+        FileFormatError: not JSON, another layout's points, an unknown name (suggests the nearest),
+            anything but so many finite numbers a point, no point at all; says where.
     """
     try:
         return _points(as_object(read_json(path), "", _KEYS), layout, axes)
@@ -52,7 +54,9 @@ def write_points_json(
 
     Args:
         points: by name, two numbers each, or three each.
-    Raises: InputError: a name that the layout does not have, shapes, NaN, the place.
+
+    Raises:
+        InputError: a name that the layout does not have, shapes, NaN, the place.
     """
     rows = {}
     for name, point in points.items():

@@ -75,7 +75,9 @@ _PARTNER = {
 def read_pts(path: str | Path) -> Float[Array, "n 2"]:
     """The points of a file, (N, 2) px, the first pixel's centre at (0.5, 0.5).
 
-    Raises: InputError: the file cannot be read. FileFormatError: no such file; says where.
+    Raises:
+        InputError: the file cannot be read.
+        FileFormatError: no such file; says where.
     """
     text = read_text(path, MAX_POINTS_BYTES, "an iBUG .pts file")
     # What stands behind # or // is a comment; the line itself stays, for the count.
@@ -98,7 +100,8 @@ def read_pts(path: str | Path) -> Float[Array, "n 2"]:
 def write_pts(path: str | Path, points: Float[Array, "n 2"]) -> None:
     """Writes (N, 2) px, the first pixel's centre at (0.5, 0.5), to a thousandth of a pixel.
 
-    Raises: InputError: shape, NaN, the place.
+    Raises:
+        InputError: shape, NaN, the place.
     """
     shifted = check_array("points", points, (None, 2)) - 0.5 + FIRST_CENTRE
     rows = [f"{x:.3f} {y:.3f}" for x, y in shifted]
@@ -118,7 +121,8 @@ def points_from_ibug(
 def points_to_ibug(layout: FeatureLayout, points: Float[Array, "n 2"]) -> Float[Array, "68 2"]:
     """iBUG's 68 points: those shared, and the others evenly along the lines that both draw.
 
-    Raises: InputError: shape, NaN, a layout without the points that this needs.
+    Raises:
+        InputError: shape, NaN, a layout without the points that this needs.
     """
     points = check_array("points", points, (len(layout.names), 2))
     ibug = np.empty((IBUG_COUNT, 2))

@@ -42,7 +42,9 @@ class Delineation:
 def read_tem(path: str | Path) -> Delineation:
     """The delineation in a file.
 
-    Raises: InputError: the file cannot be read. FileFormatError: no delineation; says where.
+    Raises:
+        InputError: the file cannot be read.
+        FileFormatError: no delineation; says where.
     """
     numbers = Numbers(path, "a .tem delineation")
     count = numbers.count("number of points")
@@ -62,7 +64,8 @@ def _line(numbers: Numbers, count: int) -> TemLine:
 def write_tem(path: str | Path, delineation: Delineation) -> None:
     """Writes a delineation, to a thousandth of a pixel.
 
-    Raises: InputError: shapes, NaN, a line through a point that is not there, the place.
+    Raises:
+        InputError: shapes, NaN, a line through a point that is not there, the place.
     """
     points = check_array("points", delineation.points, (None, 2))
     rows = [str(len(points)), *(f"{x:.3f}\t{y:.3f}" for x, y in points)]
@@ -79,7 +82,8 @@ def write_tem(path: str | Path, delineation: Delineation) -> None:
 def points_to_tem(layout: FeatureLayout, points: Float[Array, "n 2"]) -> Delineation:
     """All points of a layout in their order, with a line through each row of them.
 
-    Raises: InputError: shape, NaN.
+    Raises:
+        InputError: shape, NaN.
     """
     points = check_array("points", points, (len(layout.names), 2))
     rows: dict[str, list[int]] = {}
@@ -96,7 +100,9 @@ def points_from_tem(
 
     Args:
         name: of the file, for messages.
-    Raises: OtherPointsError: a template that is not in `TEMPLATES`.
+
+    Raises:
+        OtherPointsError: a template that is not in `TEMPLATES`.
     """
     count = len(delineation.points)
     if count == len(layout.names):

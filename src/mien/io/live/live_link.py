@@ -66,9 +66,13 @@ def write_live_link(
         moments: in rising time, from 0 s on.
         units_of: the units that stand for a face; for a caller who can explain its photographed
             expressions in units.
-    Returns: how many frames were written.
-    Raises: InputError: no moment, a unit that the format has no column for, a negative time, a
-        place that cannot be written.
+
+    Returns:
+        how many frames were written.
+
+    Raises:
+        InputError: no moment, a unit that the format has no column for, a negative time, a place
+            that cannot be written.
     """
     count = 0
     header = [TIMECODE, COUNT, *map(column_of, UNITS), *HEAD_COLUMNS, *EYE_COLUMNS]
@@ -103,8 +107,12 @@ def values_of(moment: Moment, given: Mapping[str, float]) -> dict[str, float]:
 
     Args:
         given: weights of the units that stand for the moment's face.
-    Returns: in the order of the file's columns; Unreal's angles, radians.
-    Raises: InputError: a unit that the format does not know.
+
+    Returns:
+        in the order of the file's columns; Unreal's angles, radians.
+
+    Raises:
+        InputError: a unit that the format does not know.
     """
     weights = unit_weights(moment.state, given)
     yaw, pitch, roll = head_angles(moment.rotation, order="YXZ")
@@ -117,7 +125,8 @@ def unit_weights(state: FaceState, given: Mapping[str, float]) -> dict[str, floa
 
     What goes beyond UNIT_RANGE so, which readers refuse, stays at its end.
 
-    Raises: InputError: a unit that is none of them.
+    Raises:
+        InputError: a unit that is none of them.
     """
     for name in given:
         if name not in UNITS:

@@ -43,6 +43,7 @@ def load_live_link(path: str | Path, *, timecode_rate: float | None = None) -> T
     Args:
         timecode_rate: frames a second that the timecodes count; found from where they start again
             unless given, and the app's 60 where they never do.
+
     Raises:
         InputError: the file cannot be read.
         FileFormatError: names line and column: another kind of file, a unit that is missing or

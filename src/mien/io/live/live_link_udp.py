@@ -55,8 +55,9 @@ class Packet:
 def encode(packet: Packet) -> bytes:
     """The bytes of a packet; weights of units are clipped to 0 and 1, as far as the app's go.
 
-    Raises: InputError: a subject or device of no or of too many bytes, a negative time, values
-        that are not all 61.
+    Raises:
+        InputError: a subject or device of no or of too many bytes, a negative time, values that are
+            not all 61.
     """
     if set(packet.values) != set(NAMES):
         raise InputError("values", f"the {len(NAMES)} of Live Link Face", len(packet.values))
@@ -81,7 +82,8 @@ def encode(packet: Packet) -> bytes:
 def decode(data: bytes) -> Packet:
     """The packet that these bytes are.
 
-    Raises: InputError: says what was expected at which byte.
+    Raises:
+        InputError: says what was expected at which byte.
     """
     reader = _Reader(data)
     (version,) = reader.take(1)

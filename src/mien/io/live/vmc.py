@@ -37,7 +37,9 @@ def encode_face(moment: Moment, given: Mapping[str, float]) -> bytes:
 
     Args:
         given: weights of the units that stand for the moment's face.
-    Raises: InputError: a unit that is not one of ARKit's 52.
+
+    Raises:
+        InputError: a unit that is not one of ARKit's 52.
     """
     return _bundle([*_alive(moment.time, tracked=True), *_bones(moment), *_blends(moment, given)])
 

@@ -18,8 +18,10 @@ def check_export_place(path: str | Path, *, read: Iterable[str | Path] = ()) -> 
 
     Args:
         read: files and folders that the head comes from.
-    Raises: InputError: another suffix, a place that is read or cannot be written; for an .obj
-        somebody else's file where its .mtl or .png would go.
+
+    Raises:
+        InputError: another suffix, a place that is read or cannot be written; for an .obj somebody
+            else's file where its .mtl or .png would go.
     """
     path = Path(path)
     files = [path]
@@ -50,8 +52,10 @@ def export_head(
         units: with the face units as morph targets; an .obj cannot hold any.
         expression: which one an .obj shows; the other kinds hold all of them.
         animation: how the head moves; an .obj cannot.
-    Raises: InputError: another suffix, an unknown part or expression, what this kind of file
-        cannot hold, a place that cannot be written; for .usdz that usd-core is not installed.
+
+    Raises:
+        InputError: another suffix, an unknown part or expression, what this kind of file cannot
+            hold, a place that cannot be written; for .usdz that usd-core is not installed.
     """
     suffix = _check_suffix(path)
     if suffix == ".obj":

@@ -47,13 +47,15 @@ def save_glb(
     Args:
         parts: names of parts; by default all but the hair cap and the lashes.
         units: with the face units.
-        lit: materials that the viewer's lights shade, which Blender opens as a Principled BSDF
-            that can be worked on. False marks them unlit (KHR_materials_unlit): the texture as
+        lit: materials that the viewer's lights shade, which Blender opens as a Principled BSDF that
+            can be worked on. False marks them unlit (KHR_materials_unlit): the texture as
             photographed, with the light that was there.
         image: how the textures are stored; PNG is exact and several times as large.
         animation: how the head moves.
-    Raises: InputError: an unknown part, an animation of targets that the file has not, a place
-        that cannot be written.
+
+    Raises:
+        InputError: an unknown part, an animation of targets that the file has not, a place that
+            cannot be written.
     """
     data = glb_bytes(head, parts=parts, units=units, lit=lit, image=image, animation=animation)
     with atomic_file(path) as temporary:

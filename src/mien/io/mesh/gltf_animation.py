@@ -17,7 +17,8 @@ def animation_json(
 ) -> Json:
     """The animation of a node and its mesh, whose morph targets have these names.
 
-    Raises: InputError: a target that moves is not among the names, nothing moves.
+    Raises:
+        InputError: a target that moves is not among the names, nothing moves.
     """
     weights = animation.weights_of(target_names)
     samples: dict[str, Array] = {}

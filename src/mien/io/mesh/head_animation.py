@@ -25,8 +25,10 @@ class HeadAnimation:
         shapes: morph targets that the file gets for this animation: (V, 3) mm over the head's
             vertices, by name.
         name: what players list it as.
-    Raises: InputError: shapes that do not fit, NaN, no time, time that stands or runs backwards,
-        a name twice, a matrix that is no rotation.
+
+    Raises:
+        InputError: shapes that do not fit, NaN, no time, time that stands or runs backwards, a name
+            twice, a matrix that is no rotation.
     """
 
     times: Float[Array, " t"]
@@ -60,7 +62,8 @@ class HeadAnimation:
     def weights_of(self, names: Sequence[str]) -> Float[Array, "t m"]:
         """(T, M) weights of these targets in this order, 0 where none are given.
 
-        Raises: InputError: a target that moves is not among the names.
+        Raises:
+            InputError: a target that moves is not among the names.
         """
         for name in self.target_names:
             if name not in names:

@@ -34,7 +34,9 @@ def save_obj(
     Args:
         parts: names of parts; by default all but the hair cap and the lashes.
         expression: which of the photographed ones, with its texture.
-    Raises: InputError: an unknown part or expression, a place that cannot be written.
+
+    Raises:
+        InputError: an unknown part or expression, a place that cannot be written.
     """
     path = Path(path)
     surface = export_surface(_at_rest_in(head, expression), parts=parts, units=False)

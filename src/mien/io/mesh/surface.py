@@ -93,8 +93,10 @@ def export_surface(
         parts: names; by default those that pictures show, all but the hair cap and the lashes.
         units: with the face units.
         shapes: further morph targets: mm over the head's vertices.
-    Raises: InputError: an unknown part, nothing left to export, a further target with the name or
-        without the shape of the others.
+
+    Raises:
+        InputError: an unknown part, nothing left to export, a further target with the name or
+            without the shape of the others.
     """
     offsets = target_offsets(head, units=units)
     for name, shape in (shapes or {}).items():
@@ -140,8 +142,9 @@ def split_at_seams(
 ) -> tuple[Int[Array, " n"], Int[Array, " n"], Int[Array, "f 3"]]:
     """Corners for formats that want one texture coordinate a vertex: seams are doubled.
 
-    Returns: the vertex of each corner; its texture coordinate, (0,) for a mesh without; the
-        triangles over the corners.
+    Returns:
+        the vertex of each corner; its texture coordinate, (0,) for a mesh without; the triangles
+        over the corners.
     """
     vertices = mesh.triangles[triangles].ravel()
     if len(mesh.uv_triangles) == 0:

@@ -49,8 +49,10 @@ def save_usdz(
         parts: names of parts; by default all but the hair cap and the lashes.
         units: with the face units.
         animation: how the head moves.
-    Raises: InputError: usd-core is not installed; an unknown part, an animation of targets that
-        the file has not, a place that cannot be written.
+
+    Raises:
+        InputError: usd-core is not installed; an unknown part, an animation of targets that the
+            file has not, a place that cannot be written.
     """
     try:
         from pxr import Usd

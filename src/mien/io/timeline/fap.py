@@ -2,7 +2,9 @@
 
 Values are whole numbers of FAPU / 1024, distances in this face at rest, so that another face of
 other proportions can play them; angles are in 1e-5 rad.
-Source: ISO/IEC 14496-2 annex C; P02 sec. 7.
+
+Source:
+    ISO/IEC 14496-2 annex C; [Pighin 2002] sec. 7.
 """
 
 from __future__ import annotations
@@ -43,8 +45,11 @@ class Fapu:
     """The distances in a face at rest that parameters are measured by, mm.
 
     Attributes:
-        IRISD: between upper and lower lid. ES: between the eyes. ENS: from the eyes' height to the
-            nose's base. MNS: from there to the mouth. MW: the mouth's width.
+        IRISD: between upper and lower lid.
+        ES: between the eyes.
+        ENS: from the eyes' height to the nose's base.
+        MNS: from there to the mouth.
+        MW: the mouth's width.
     """
 
     IRISD: float
@@ -59,7 +64,10 @@ def measure_fapu(vertices: Float[Array, "v 3"]) -> Fapu:
 
     Args:
         vertices: (V, 3) mm, head space, of the generic head's topology.
-    Raises: InputError: another shape. EstimationError: a distance of 0 or less.
+
+    Raises:
+        InputError: another shape.
+        EstimationError: a distance of 0 or less.
     """
     vertices = _check_vertices("vertices", vertices)
     left, right = (_eyeball(vertices, side).mean(axis=0) for side in EYEBALLS)
@@ -88,7 +96,8 @@ class FapMeter:
     """Reads a head's parameters off its moved vertices.
 
     Attributes:
-        neutral: (V, 3) mm, head space: the head at rest. fapu: its units.
+        neutral: (V, 3) mm, head space: the head at rest.
+        fapu: its units.
     """
 
     neutral: Float[Array, "v 3"]
@@ -107,7 +116,9 @@ class FapMeter:
         Args:
             vertices: (V, 3) mm, head space: the face, the head itself unmoved.
             rotation: of the head.
-        Raises: InputError: another shape, a matrix that is no rotation.
+
+        Raises:
+            InputError: another shape, a matrix that is no rotation.
         """
         vertices = _check_vertices("vertices", vertices)
         moved = vertices - self.neutral
@@ -144,8 +155,12 @@ def write_fap(
         values: (68,) a frame, as FapMeter.read gives them.
         fps: frames a second; the format knows whole numbers only.
         name: of the performance; the file's own unless given.
-    Returns: how many frames were written.
-    Raises: InputError: no frame, a rate that is no whole number, a place that cannot be written.
+
+    Returns:
+        how many frames were written.
+
+    Raises:
+        InputError: no frame, a rate that is no whole number, a place that cannot be written.
     """
     if not (fps >= 1 and float(fps).is_integer()):
         expected = "a whole number of frames a second, which is all that it can say"

@@ -1,6 +1,8 @@
 """The 68 facial animation parameters of MPEG-4, and where on the mesh each is measured.
 
-Source: ISO/IEC 14496-2 annex C, table C-1; the feature points' places on our mesh are our choice,
+Source:
+    ISO/IEC 14496-2 annex C, table C-1; the feature points' places on our mesh are our choice,
+
 listed in docs/animation.md.
 """
 
@@ -14,9 +16,11 @@ class Parameter:
     """One low-level parameter that a point's displacement gives.
 
     Attributes:
-        number: 3 to 68. name: the standard's.
+        number: 3 to 68.
+        name: the standard's.
         points: features of the generic head, or `landmark.INDEX`; several: their mean.
-        axis: 0 to 2 for x, y, z in head space. sign: which way along it counts as positive.
+        axis: 0 to 2 for x, y, z in head space.
+        sign: which way along it counts as positive.
         unit: which distance in the face is 1024: "IRISD", "ES", "ENS", "MNS" or "MW".
         relative_to: features whose displacement does not count.
         one_way: never negative.

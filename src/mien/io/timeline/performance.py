@@ -43,7 +43,9 @@ def performance(
         moments: in the order of their times, one for each frame.
         evaluate: the rig's.
         tolerance_mm: how far any vertex may be from the rig's at these times.
-    Raises: InputError: no moment, times that do not ascend, a tolerance of 0 or less.
+
+    Raises:
+        InputError: no moment, times that do not ascend, a tolerance of 0 or less.
     """
     offsets = target_offsets(head)
     shapes = _Shapes(check_positive("tolerance_mm", tolerance_mm), head.mesh.vertices.shape)

@@ -22,9 +22,13 @@ def check_timeline(
     """Refuse a timeline that moves what a head does not have.
 
     Args:
-        expressions, units, regions: the head's names.
+        expressions: the head's names.
+        units: the head's names.
+        regions: the head's names.
         path: how the message calls the timeline.
-    Raises: FileFormatError: names the place, suggests the nearest names.
+
+    Raises:
+        FileFormatError: names the place, suggests the nearest names.
     """
     for place, channel in _channels(timeline):
         group, name = split(channel)

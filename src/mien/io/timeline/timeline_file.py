@@ -11,7 +11,8 @@ from mien.errors import InputError
 def load_performance(path: str | Path) -> Timeline:
     """The timeline in a .json document, a Live Link Face .csv recording or a TRACK.csv.
 
-    Raises: InputError: another suffix, a file that cannot be read, a track without a face.
+    Raises:
+        InputError: another suffix, a file that cannot be read, a track without a face.
         FileFormatError: as load_timeline, load_live_link and load_track.
     """
     from mien.io.timeline.timeline_json import load_timeline

@@ -68,7 +68,8 @@ def load_timeline(path: str | Path) -> Timeline:
 def save_timeline(path: str | Path, timeline: Timeline) -> None:
     """Write a timeline document, whole or not at all; load_timeline gives the timeline back.
 
-    Raises: InputError: a place that cannot be written.
+    Raises:
+        InputError: a place that cannot be written.
     """
     text = json.dumps(timeline_to_json(timeline), indent=2, ensure_ascii=False, allow_nan=False)
     # One key, one clip that is played, one pair of numbers: a line each.

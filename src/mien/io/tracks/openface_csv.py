@@ -2,7 +2,9 @@
 
 A row a frame, counted from 1: pose in the camera's frame (mm, radians), a gaze vector for each eye,
 FACS action units from 0 to 5. What is approximate: docs/track-files.md.
-Source: OpenFace's wiki, "Output Format"; the order of its FeatureExtraction's columns.
+
+Source:
+    OpenFace's wiki, "Output Format"; the order of its FeatureExtraction's columns.
 """
 
 from __future__ import annotations
@@ -80,8 +82,12 @@ def write_openface(
     Args:
         units_of: the units that stand for a face; for a caller who can explain its photographed
             expressions in units.
-    Returns: how many frames were written.
-    Raises: InputError: no frame, a place that cannot be written.
+
+    Returns:
+        how many frames were written.
+
+    Raises:
+        InputError: no frame, a place that cannot be written.
     """
     if not track.frames:
         raise InputError(path, "at least one frame to write", "none")

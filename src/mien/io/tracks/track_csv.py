@@ -42,8 +42,9 @@ def columns_of(layout: Layout) -> tuple[str, ...]:
 def check_track_place(path: str | Path) -> None:
     """Refuse, before any work is done, a name that write_track would not take.
 
-    Raises: InputError: another suffix than .csv; a TRACK.json beside it that is no track's, such as
-        a timeline of the same name.
+    Raises:
+        InputError: another suffix than .csv; a TRACK.json beside it that is no track's, such as a
+            timeline of the same name.
     """
     check_sidecar(sidecar_of(path))
 
@@ -54,8 +55,9 @@ def write_track(path: str | Path, track: Track) -> None:
     Numbers keep 1e-10. A number that is not finite becomes an empty cell, and so do all of a lost
     frame's but its frame and time.
 
-    Raises: InputError: as check_track_place; a place that cannot be written; a frame whose numbers
-        are not those of the layout.
+    Raises:
+        InputError: as check_track_place; a place that cannot be written; a frame whose numbers are
+            not those of the layout.
     """
     check_track_place(path)
     # Both are written before either takes its place.

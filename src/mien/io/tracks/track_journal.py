@@ -82,7 +82,9 @@ class Journal:
                 another one must not go on from here.
             frames: those of the journal that this one continues.
             clock: seconds.
-        Raises: InputError: a place that cannot be written.
+
+        Raises:
+            InputError: a place that cannot be written.
         """
         path = Path(path)
         top = {"format": FORMAT, "version": VERSION, "run": header}
@@ -95,7 +97,8 @@ class Journal:
     def append(self, frame: TrackedFrame) -> None:
         """Add a frame; it is on its way to the disk within FLUSH_SECONDS of frames.
 
-        Raises: InputError: the place cannot be written any more.
+        Raises:
+            InputError: the place cannot be written any more.
         """
         with _writing(self.path):
             self._file.write(_line_of(frame))
@@ -133,6 +136,7 @@ def load_journal(
     Args:
         header: of the run that wants to go on.
         layout: of its frames.
+
     Raises:
         InputError: the file cannot be read; another run's journal: names what differs.
         FileFormatError: no journal, a newer version; a line that holds no frame, or another one

@@ -33,7 +33,8 @@ def sidecar_of(path: str | Path) -> Path:
 def check_sidecar(path: Path) -> None:
     """Refuse to write over a file that is no track's, such as a timeline of the same name.
 
-    Raises: InputError.
+    Raises:
+        InputError: bad input.
     """
     if not path.exists():
         return
@@ -67,8 +68,10 @@ def sidecar_text(track: Track) -> str:
 def load_sidecar(path: Path) -> Track:
     """A track without frames.
 
-    Raises: InputError: no such file. FileFormatError: not a track's, a newer version, a key that
-        is missing or holds something else.
+    Raises:
+        InputError: no such file.
+        FileFormatError: not a track's, a newer version, a key that is missing or holds something
+            else.
     """
     if not path.exists():
         expected = "the file that goes with the .csv and says what its numbers mean"

@@ -1,8 +1,8 @@
 """Filling the holes of an image from their surroundings.
 
-Two ways, both P02 sec. 5.2.2: an image pyramid (Gortler et al. 1996) and growth by one pixel at a
-time. Both leave known pixels as they are and reproduce a constant. With `wrap`, the left and right
-ends of the image touch, as on a cylinder.
+Two ways, both [Pighin 2002] sec. 5.2.2: an image pyramid (Gortler et al. 1996) and growth by one
+pixel at a time. Both leave known pixels as they are and reproduce a constant. With `wrap`, the left
+and right ends of the image touch, as on a cylinder.
 """
 
 from __future__ import annotations
@@ -23,8 +23,12 @@ def fill_pyramid(
         image: (H, W, C); what is under weight zero has no influence.
         weights: (H, W) in [0, 1]: how far a pixel is known. In between, the result is the blend.
         wrap: left and right ends touch.
-    Raises: InputError: shapes, weights all zero.
-    Source: P02 sec. 5.2.2, after Gortler et al., The Lumigraph, 1996 (pull and push).
+
+    Raises:
+        InputError: shapes, weights all zero.
+
+    Source:
+        [Pighin 2002] sec. 5.2.2, after Gortler et al., The Lumigraph, 1996 (pull and push).
     """
     image, weights = _check(image, weights)
     weighted = np.concatenate([image * weights[..., None], weights[..., None]], axis=2)
@@ -43,14 +47,19 @@ def fill_growing(
     image: Float[Array, "h w c"], known: Bool[Array, "h w"], *, wrap: bool = False
 ) -> Float[Array, "h w c"]:
     """Holes filled by growing the known area a pixel at a time, each new one the mean of its known
+
     neighbours (of eight): (H, W, C) float32.
 
     Args:
         image: (H, W, C).
         known: (H, W) bool.
         wrap: left and right ends touch.
-    Raises: InputError: shapes, nothing known.
-    Source: P02 sec. 5.2.2, first algorithm.
+
+    Raises:
+        InputError: shapes, nothing known.
+
+    Source:
+        [Pighin 2002] sec. 5.2.2, first algorithm.
     """
     image, weights = _check(image, np.asarray(known, bool))
     out = np.ascontiguousarray(image)

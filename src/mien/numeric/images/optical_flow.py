@@ -24,7 +24,8 @@ def normalize_contrast(
     the mask count for the statistics, so that a background does not darken what is before it.
 
     Args:
-        image: (H, W) from 0 to 255. radius_px: about the size of what is kept.
+        image: (H, W) from 0 to 255.
+        radius_px: about the size of what is kept.
     """
     import cv2
 
@@ -55,8 +56,8 @@ def match_images(
     Fast Optical Flow using Dense Inverse Search, 2016) down to single pixels.
 
     Args:
-        fine: of waves 18 px long half the height is found instead of a quarter, at twice the
-            noise: for those who average.
+        fine: of waves 18 px long half the height is found instead of a quarter, at twice the noise:
+            for those who average.
     """
     flow: Array = _searcher(fine).calc(_eight_bit(a), _eight_bit(b), None)
     return flow

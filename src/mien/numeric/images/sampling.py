@@ -16,7 +16,9 @@ def sample_bilinear(image: Array, xy: Float[Array, "n 2"]) -> Float[Array, "n c"
     Args:
         image: (H, W, C) uint8 or float32.
         xy: (N, 2) px; beyond the outermost centres the image goes on as it ends.
-    Raises: InputError: shapes, an empty image, NaN.
+
+    Raises:
+        InputError: shapes, an empty image, NaN.
 
     OpenCV's remap is about as fast but rounds places to 1/32 px, which shows in derivatives.
     """

@@ -1,8 +1,8 @@
 """Which triangle each sample shows, strip by strip: little memory, and nothing leaves the cache.
 
-The tests at the edges are numeric.raster.rasterizer's, so that the same samples belong to the same triangles;
-what it writes for every pixel is worked out here for the triangles, once, and evaluated only where
-somebody looks.
+The tests at the edges are numeric.raster.rasterizer's, so that the same samples belong to the same
+triangles; what it writes for every pixel is worked out here for the triangles, once, and evaluated
+only where somebody looks.
 """
 
 from __future__ import annotations
@@ -29,14 +29,16 @@ class Coverage(NamedTuple):
     """Triangles on the grid of samples.
 
     Attributes:
-        points: (V, 2) samples' widths. triangles: (F, 3) vertex indices.
+        points: (V, 2) samples' widths.
+        triangles: (F, 3) vertex indices.
         boxes: (F, 4) first and last row, first and last column whose centres a triangle can hold;
             the first row lies after the last where it holds none or cannot be drawn.
         planes: (F, 9) place of the first corner; 1 / z of the three; by how much the barycentrics
             of the second and the third grow in x and in y.
         starts: (2 strips + 1,) where each strip's fronts, and then its backs, start in order.
         order: triangles by strip and side, in their own order within each.
-        left, width: the columns that the triangles reach, widened to whole blocks.
+        left: the columns that the triangles reach, widened to whole blocks.
+        width: the columns that the triangles reach, widened to whole blocks.
     """
 
     points: Float[Array, "v 2"]
@@ -59,8 +61,8 @@ def prepare_coverage(
     """Triangles ready to be drawn on width x height samples, STRIP rows at a time.
 
     Args:
-        points: (V, 2). depth: (V,) camera z; a triangle with a vertex at zero, behind it or not
-            finite is skipped.
+        points: (V, 2).
+        depth: (V,) camera z; a triangle with a vertex at zero, behind it or not finite is skipped.
     """
     count = len(triangles)
     boxes, planes = np.empty((count, 4), np.int32), np.empty((count, 9))

@@ -31,7 +31,8 @@ def facing(triangles: Int[Array, "t 3"], points: Float[Array, "n 2"]) -> Int[Arr
     Points may be moved then: what folds over is not drawn. While the mesh's border stays, its
     inside stays covered.
 
-    Raises: InputError: shapes, NaN, an index out of range, a triangle without area.
+    Raises:
+        InputError: shapes, NaN, an index out of range, a triangle without area.
     """
     points = check_array("points", points, (None, 2))
     turned = check_triangles(triangles, len(points)).copy()
@@ -49,9 +50,12 @@ def affine_maps(corners: Array, triangles: Array, pictures: Array) -> Array:
     """Where in other pictures the pixels of each triangle lie.
 
     Args:
-        corners: (n, 2) snapped, of the picture that is drawn. triangles: (T, 3) facing.
+        corners: (n, 2) snapped, of the picture that is drawn.
+        triangles: (T, 3) facing.
         pictures: (m, n, 2) px, the same points in each of the others.
-    Returns: (T, m, 6): x at the pixel that holds the first corner, counted from the centre of the
+
+    Returns:
+        (T, m, 6): x at the pixel that holds the first corner, counted from the centre of the
         picture's first pixel, its change by column and by row; the same of y. Undefined for
         triangles that are not drawn.
     """
@@ -109,12 +113,15 @@ def cut_row(
     Where several cover a pixel, as beside a fold, the one that begins first has it.
 
     Args:
-        tops, ends: of `extents`.
+        tops: of `extents`.
+        ends: of `extents`.
         width: of the picture.
         found: (T, 3) memory to work in.
         starts: (2 T + 2,) filled with the spans' first columns and, after them, the width.
         spans: (2 T + 1,) filled with their triangles, -1 where there is none.
-    Returns: how many spans.
+
+    Returns:
+        how many spans.
     """
     size = 0
     for t in range(len(triangles)):

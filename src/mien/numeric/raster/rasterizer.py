@@ -55,9 +55,12 @@ def rasterize(
         vertices_px: (V, 2) px.
         depth: (V,) camera z; a triangle with a vertex at zero, behind it or not finite is skipped.
         triangles: (F, 3) vertex indices, counter-clockwise as the camera sees their front.
-        width, height: px.
+        width: px.
+        height: px.
         cull: leave out triangles seen from behind.
-    Raises: InputError: shapes, sizes, an index out of range.
+
+    Raises:
+        InputError: shapes, sizes, an index out of range.
     """
     for name, size in (("width", width), ("height", height)):
         check_positive(name, size)
@@ -87,7 +90,8 @@ def interpolate(
 ) -> Float[Array, "h w c"]:
     """Values at the vertices, interpolated over the pixels: (H, W, C) float32, zero outside.
 
-    Raises: InputError: shapes, an index out of range.
+    Raises:
+        InputError: shapes, an index out of range.
     """
     values = check_array("values", values, (None, None), dtype=np.float32, finite=False)
     triangles = check_triangles(triangles, len(values))

@@ -18,7 +18,9 @@ class Anderson:
     Args:
         depth: how many past differences are used.
         regularization: relative ridge of the small least-squares problem.
-    Source: Walker and Ni, Anderson acceleration for fixed-point iterations, SINUM 2011.
+
+    Source:
+        Walker and Ni, Anderson acceleration for fixed-point iterations, SINUM 2011.
     """
 
     def __init__(self, depth: int, *, regularization: float = 1e-10) -> None:

@@ -20,7 +20,9 @@ class LmResult(Generic[X]):
     """Where the iteration ended.
 
     Attributes:
-        x: the unknowns. cost: at x. iterations: linearizations made.
+        x: the unknowns.
+        cost: at x.
+        iterations: linearizations made.
         converged: False where the limit on iterations came first.
     """
 
@@ -49,9 +51,11 @@ def minimize_lm(
             diagonal, solves for a step and predicts by how much the cost falls.
         move: x after a step; where rotations stay rotations.
         tolerance: relative fall of the cost, predicted and found, at which it has converged.
-        max_failures: steps in a row that may fail before it counts as converged, for those who
-            must be done in time; by default as many as it takes.
-    Source: Nielsen, Damping parameter in Marquardt's method, 1999 (how damping follows the gain).
+        max_failures: steps in a row that may fail before it counts as converged, for those who must
+            be done in time; by default as many as it takes.
+
+    Source:
+        Nielsen, Damping parameter in Marquardt's method, 1999 (how damping follows the gain).
     """
     value, growth = cost(x), 2.0
     for iteration in range(1, max_iterations + 1):

@@ -20,8 +20,11 @@ class BlockSystem:
     """[[common, coupling], [coupling^T, blocks]] x = -gradient, blocks on the diagonal only.
 
     Attributes:
-        common: (D, D). blocks: (N, B, B). coupling: (N, D, B).
-        common_gradient: (D,). block_gradient: (N, B).
+        common: (D, D).
+        blocks: (N, B, B).
+        coupling: (N, D, B).
+        common_gradient: (D,).
+        block_gradient: (N, B).
     """
 
     common: Float[Array, "d d"]
@@ -55,10 +58,14 @@ class BlockSystem:
         """Covariances of the common unknowns and of each block, for unit residual variance.
 
         Args:
-            constraints: (N, Q, B), Q linear combinations of the block unknowns, summed over
-                blocks, that are held at zero: as many as the data leave free for all together.
-        Returns: (D, D) and (N, B, B), infinite for a block that the data do not determine.
-        Raises: EstimationError: the constraints leave something free.
+            constraints: (N, Q, B), Q linear combinations of the block unknowns, summed over blocks,
+                that are held at zero: as many as the data leave free for all together.
+
+        Returns:
+            (D, D) and (N, B, B), infinite for a block that the data do not determine.
+
+        Raises:
+            EstimationError: the constraints leave something free.
         """
         # A block that its data leave partly open has no coupling along the open directions.
         own = np.linalg.pinv(self.blocks, rcond=_OPEN, hermitian=True)

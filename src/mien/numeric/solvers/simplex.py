@@ -31,10 +31,16 @@ def simplex_least_squares(
         target: (d,).
         slack: how far below 0 a share may go; above 0, the mixture may leave the convex hull.
         penalty: (m,) cost of a column's share, in the square of the target's unit.
-    Returns: (m,) shares that sum to 1, none below -slack.
-    Raises: InputError: shapes, NaN, no column, a slack below 0. EstimationError: numbers so large
-        that the solver does not converge.
-    Source: Z06 section 6, eq. (2) to (5); slack and penalty are not the paper's.
+
+    Returns:
+        (m,) shares that sum to 1, none below -slack.
+
+    Raises:
+        InputError: shapes, NaN, no column, a slack below 0.
+        EstimationError: numbers so large that the solver does not converge.
+
+    Source:
+        [Zhang 2006] section 6, eq. (2) to (5); slack and penalty are not the paper's.
     """
     columns = check_array("columns", columns, (None, None))
     target = check_array("target", target, (len(columns),))
@@ -58,7 +64,8 @@ def nearest_mixture(
     Unlike `simplex_least_squares` it looks at nothing: for many small problems, each of which takes
     20 us, that would be most of the time.
 
-    Raises: EstimationError: as there.
+    Raises:
+        EstimationError: as there.
     """
     scale = max(float(products.diagonal().max()), float(np.abs(penalty).max()))
     if scale == 0.0:

@@ -43,8 +43,10 @@ class LiveStatus:
     """How it goes at one frame.
 
     Attributes:
-        frame: its number. status: how it was found.
-        fps: frames a second lately; 0 at the first. latency: seconds from picture to packet.
+        frame: its number.
+        status: how it was found.
+        fps: frames a second lately; 0 at the first.
+        latency: seconds from picture to packet.
         dropped: pictures that came too soon, so far.
     """
 
@@ -60,8 +62,11 @@ class LiveSummary:
     """How it went.
 
     Attributes:
-        frames: tracked ones. lost: those of them without a face. dropped: pictures left out.
-        seconds: from the first packet to the last. fps: frames a second; 0 of a single frame.
+        frames: tracked ones.
+        lost: those of them without a face.
+        dropped: pictures left out.
+        seconds: from the first packet to the last.
+        fps: frames a second; 0 of a single frame.
         latency: median seconds from picture to packet; None where there was no frame.
         notes: what was odd.
     """
@@ -92,9 +97,14 @@ def run_live(
         source: a camera's number or a video, as for `open_source`.
         make_tracker: called once, with the source open.
         streams: addresses, as for `parse_stream`.
-        seconds, max_side, record, tell: as for `track_live`.
-    Raises: InputError, FileFormatError: before anything is tracked, a source or a stream that
-        cannot be opened.
+        seconds: as for `track_live`.
+        max_side: as for `track_live`.
+        record: as for `track_live`.
+        tell: as for `track_live`.
+
+    Raises:
+        InputError: before anything is tracked, a source or a stream that cannot be opened.
+        FileFormatError: as InputError.
     """
     addresses = [parse_stream(text) for text in streams]
     with ExitStack() as stack:
@@ -118,7 +128,9 @@ def run_live(
 def open_source(text: str) -> LiveSource:
     """`0`, `1`, … for a camera of this computer; anything else is a video that stands in for one.
 
-    Raises: InputError, FileFormatError: no such camera, no such video.
+    Raises:
+        InputError: no such camera, no such video.
+        FileFormatError: no such camera, no such video.
     """
     from mien.capture.video.webcam import Webcam
 

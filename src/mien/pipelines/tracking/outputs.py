@@ -36,7 +36,9 @@ class TrackFiles:
 
     Attributes:
         table: TRACK.csv, with TRACK.json beside it.
-        overlay: .mp4 or .webm. plots: a folder. live_link: a Live Link Face recording.
+        overlay: .mp4 or .webm.
+        plots: a folder.
+        live_link: a Live Link Face recording.
         openface: a table like OpenFace's.
     """
 
@@ -51,7 +53,9 @@ class TrackFiles:
 
         Args:
             read: files and folders beside the video that must stay as they are, as the head's.
-        Raises: InputError: names the first of them; two results, or one and what is read, in one.
+
+        Raises:
+            InputError: names the first of them; two results, or one and what is read, in one.
         """
         self._check_apart(video)
         written = [self.table, self.overlay, self.live_link, self.openface]
@@ -74,7 +78,9 @@ class TrackFiles:
         Args:
             video: that was tracked.
             tell: told stage, steps done and their total.
-        Yields: what the user should know.
+
+        Yields:
+            what the user should know.
         """
         write_track(self.table, track)
         explained = partial(units_of, head)

@@ -66,7 +66,10 @@ class TrackRun:
 
         Args:
             layout: of the frames.
-        Raises: InputError, FileFormatError: another run's, a place that cannot be written.
+
+        Raises:
+            InputError: another run's, a place that cannot be written.
+            FileFormatError: another run's, a place that cannot be written.
         """
         path = journal_of(output)
         kept = load_journal(path, self.header, layout) if resume and path.exists() else ()
@@ -96,7 +99,9 @@ class TrackRun:
 
         Args:
             tell: told TRACKING, the frames done and their total.
-        Raises: FileFormatError: more frames are kept than the clip has.
+
+        Raises:
+            FileFormatError: more frames are kept than the clip has.
         """
         from threadpoolctl import threadpool_limits
 

@@ -30,7 +30,9 @@ class StreamAddress:
     """Who receives the packets.
 
     Attributes:
-        protocol: "livelink" or "vmc". host, port: where.
+        protocol: "livelink" or "vmc".
+        host: where.
+        port: where.
         subject: the name under which Unreal lists a Live Link stream.
     """
 
@@ -46,6 +48,7 @@ class StreamAddress:
 
 def parse_stream(text: str) -> StreamAddress:
     """`livelink://HOST:PORT/SUBJECT` or `vmc://HOST:PORT`; this computer and the usual port unless
+
     given. Raises: InputError: neither, or no port.
     """
     try:
@@ -82,7 +85,8 @@ class LiveLinkEncoder:
     """Packets of Live Link Face.
 
     Attributes:
-        subject: the stream's name. begin: seconds since midnight at time 0 of the moments.
+        subject: the stream's name.
+        begin: seconds since midnight at time 0 of the moments.
     """
 
     subject: str
@@ -115,7 +119,9 @@ class Stream:
 
     Args:
         units_of: the units that stand for a face.
-    Raises: InputError: a host that cannot be found, a subject that is too long.
+
+    Raises:
+        InputError: a host that cannot be found, a subject that is too long.
     """
 
     def __init__(self, address: StreamAddress, units_of: UnitsOf) -> None:

@@ -44,13 +44,17 @@ class Adjustment:
     """Cameras and points of highest posterior.
 
     Attributes:
-        cameras: one a photo. points: (N, 3) mm. coefficients: (C,) of the shape prior.
+        cameras: one a photo.
+        points: (N, 3) mm.
+        coefficients: (C,) of the shape prior.
         residuals: (K, N, 2) px, projected less observed, NaN where unseen.
-        cost: minus the log posterior up to a constant. iterations, converged: of the solver.
+        cost: minus the log posterior up to a constant.
+        iterations: of the solver.
+        converged: of the solver.
         point_sd_mm: (N,) standard deviation of a point's place (all three axes together), and
         rotation_sd: (K,) radians, focal_sd: (K,) relative, all at the given sigma_px and priors.
-            Infinite where the data do not tell. Without a shape prior they are those left after
-            the points seen twice are aligned by a similarity.
+            Infinite where the data do not tell. Without a shape prior they are those left after the
+            points seen twice are aligned by a similarity.
     """
 
     cameras: tuple[Camera, ...]
@@ -87,17 +91,22 @@ def adjust_bundle(
     prior tell moves as little as the fit allows.
 
     Args:
-        cameras: K starts, from recover_pose. points: (N, 3) mm start.
+        cameras: K starts, from recover_pose.
+        points: (N, 3) mm start.
         image_points: (K, N, 2) px, NaN where unseen.
         sigma_px: standard deviation of an observation per axis, one number or (K, N).
         loss: "linear", "huber" or "cauchy", for observations of which some are wrong.
-        shape_prior, focal_prior: as the classes say; absent means nothing known.
+        shape_prior: as the classes say; absent means nothing known.
+        focal_prior: as the classes say; absent means nothing known.
         focal_group: (K,) photos with the same number share their focal length.
-        marginal: with a shape prior, find the cameras of highest probability over all places
-            that the points may have, not of the most probable places
-            (bundle.marginal_likelihood).
-    Raises: InputError: shapes, NaN, sigma not above zero.
-    Source: Triggs et al., Bundle adjustment, 2000: Schur complement over points.
+        marginal: with a shape prior, find the cameras of highest probability over all places that
+            the points may have, not of the most probable places (bundle.marginal_likelihood).
+
+    Raises:
+        InputError: shapes, NaN, sigma not above zero.
+
+    Source:
+        Triggs et al., Bundle adjustment, 2000: Schur complement over points.
     """
     data, start = _bundle_problem(
         cameras, points, image_points, sigma_px, loss, shape_prior, focal_prior, focal_group

@@ -29,12 +29,16 @@ def point_evidence(
     """Half the sum over points of log det(1 + sigma_i^2 sum_k J_ki^T J_ki), and its gradient.
 
     Args:
-        R, t: head to camera, mm. focal: px.
+        R: head to camera, mm.
+        t: head to camera, mm.
+        focal: px.
         precision: (K, N) of the observations, 1 / px; 0 unseen.
         places: (N, 3) mm at which the derivatives J_ki of the projections are taken.
         sigma: (N,) mm, of the points' priors; infinite ones are passed over.
-    Returns: the value, 0 or more, and (K, 7) its derivatives by each photo's step: rotation
-        vector, shift in x and y, log depth (of t), log focal length.
+
+    Returns:
+        the value, 0 or more, and (K, 7) its derivatives by each photo's step: rotation vector,
+        shift in x and y, log depth (of t), log focal length.
     """
     held = np.isfinite(sigma)
     precision, places = precision[:, held], places[held]

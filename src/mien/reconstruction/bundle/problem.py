@@ -37,7 +37,9 @@ class ShapePrior:
     deviation sigma_i.
 
     Attributes:
-        mean: (N, 3) mm. components: (C, N, 3) mm. sigma: (N,) mm, infinite where nothing is known.
+        mean: (N, 3) mm.
+        components: (C, N, 3) mm.
+        sigma: (N,) mm, infinite where nothing is known.
     """
 
     mean: Float[Array, "n 3"]
@@ -50,8 +52,11 @@ class Bundle:
     """The unknowns.
 
     Attributes:
-        R: (K, 3, 3) R_cam_head. t: (K, 3) mm. log_focal: (G,), one a group of photos.
-        points: (N, 3) mm. coefficients: (C,) of the shape prior.
+        R: (K, 3, 3) R_cam_head.
+        t: (K, 3) mm.
+        log_focal: (G,), one a group of photos.
+        points: (N, 3) mm.
+        coefficients: (C,) of the shape prior.
     """
 
     R: Float[Array, "k 3 3"]

@@ -25,9 +25,11 @@ class Crop:
     """A photo's part that shows the head, reduced.
 
     Attributes:
-        grey: (H, W) float32, 0 to 255. camera: of this image.
+        grey: (H, W) float32, 0 to 255.
+        camera: of this image.
         scale: (2,) its px over the photo's, along x and y: whole pixels make them differ a little.
-        corner: (2,) px of the photo at its origin. raster: the head as the camera sees it.
+        corner: (2,) px of the photo at its origin.
+        raster: the head as the camera sees it.
     """
 
     grey: Float[Array, "h w"]

@@ -63,7 +63,8 @@ def _seat(
     """Centre and radius at which the lids lie radius + gap off, near what is given (Gauss-Newton).
 
     Args:
-        centre: where the skin around the ball has carried it. radius: mm, a usual one.
+        centre: where the skin around the ball has carried it.
+        radius: mm, a usual one.
     """
     usual = np.append(centre, radius)
     prior = len(lids) / np.append(np.full(3, _TRUST_MM), _RADIUS_SD_MM) ** 2

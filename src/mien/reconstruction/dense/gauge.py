@@ -28,7 +28,8 @@ class Motions:
     """What each freedom of the frame does.
 
     Attributes:
-        of_cameras: (D, 7) to the cameras' unknowns. of_places: (N, 3, 7) mm.
+        of_cameras: (D, 7) to the cameras' unknowns.
+        of_places: (N, 3, 7) mm.
     """
 
     of_cameras: Float[Array, "d 7"]
@@ -68,6 +69,7 @@ def _split(
     problem: JointProblem, misfit: Misfit, motions: Motions
 ) -> tuple[Float[Array, "e d"], Float[Array, "f 7"]]:
     """Directions of the cameras' unknowns that change the images otherwise than the frame's do,
+
     and those of the frame's motions that move cameras.
 
     A longer lens farther away is one of the former, though the depth alone is nearly the frame's

@@ -58,7 +58,9 @@ class JointSolution:
     """Cameras, shape and places of highest posterior.
 
     Attributes:
-        cameras: one a photo. problem, state: what was asked, and the unknowns' values.
+        cameras: one a photo.
+        problem: what was asked, and the unknowns' values.
+        state: what was asked, and the unknowns' values.
         converged: whether the last step was next to nothing.
     """
 
@@ -113,12 +115,15 @@ def solve_jointly(
     """Gauss-Newton steps with Cauchy weights, the places eliminated from every step.
 
     Args:
-        cameras: K starts. places: (N, 3) mm start.
+        cameras: K starts.
+        places: (N, 3) mm start.
         anchors: (K, 3, 3) R_cam_head that the rotations are believed to lie about; those of the
             starts unless given.
         instruments: against the bias; without them the solution is that of lowest cost.
         tolerance: radians and relative changes below which a step is next to nothing.
-    Raises: EstimationError: the equations have no solution.
+
+    Raises:
+        EstimationError: the equations have no solution.
     """
     state = start_state(cameras, places, lenses, len(prior.components))
     believed = CameraPrior(state.R if anchors is None else anchors, state.t, lenses)

@@ -65,9 +65,10 @@ class Misfit:
     """How far sightings are from what a state predicts.
 
     Attributes:
-        seen: the prediction. residuals: (M, 2) px, predicted less observed.
-        weights: (M,) 1 / px^2, Cauchy's over the variances, which grow until those of guides are
-            as large as their errors.
+        seen: the prediction.
+        residuals: (M, 2) px, predicted less observed.
+        weights: (M,) 1 / px^2, Cauchy's over the variances, which grow until those of guides are as
+            large as their errors.
     """
 
     seen: Projection
@@ -91,7 +92,9 @@ class OwnEquations:
     """The places' equations while cameras and coefficients stay.
 
     Attributes:
-        inverse: (N, 3, 3) mm^2. gradient: (N, 3) 1 / mm. pull: (N, 3), its part by beliefs.
+        inverse: (N, 3, 3) mm^2.
+        gradient: (N, 3) 1 / mm.
+        pull: (N, 3), its part by beliefs.
     """
 
     inverse: Float[Array, "n 3 3"]
@@ -102,7 +105,8 @@ class OwnEquations:
 def own_equations(problem: JointProblem, state: JointState, misfit: Misfit) -> OwnEquations:
     """Of each place: P + sum b'wb, inverted, and P d + sum b'wr.
 
-    Raises: numpy.linalg.LinAlgError: neither photos nor beliefs hold a place.
+    Raises:
+        numpy.linalg.LinAlgError: neither photos nor beliefs hold a place.
     """
     by_place, precision = misfit.seen.by_place, problem.prior.precision
     weighted = np.swapaxes(misfit.weights[:, None, None] * by_place, 1, 2)
@@ -123,7 +127,8 @@ class Rows:
     """Equations matrix @ step = right between Q unknowns: D of the cameras, then coefficients.
 
     Attributes:
-        matrix: (A, Q). right: (A,).
+        matrix: (A, Q).
+        right: (A,).
     """
 
     matrix: Float[Array, "a q"]
@@ -135,7 +140,8 @@ class Elimination:
     """How the places answer to steps of cameras and coefficients.
 
     Attributes:
-        own: their own equations. columns: (N, 3, D) sums of b'wa.
+        own: their own equations.
+        columns: (N, 3, D) sums of b'wa.
     """
 
     problem: JointProblem

@@ -23,7 +23,8 @@ class PlacePrior:
     """Beliefs about N places on the head: X_n = mean_n + sum_c c_c B_cn + d_n.
 
     Attributes:
-        mean: (N, 3) mm. components: (C, N, 3) mm, B; their coefficients have deviation 1.
+        mean: (N, 3) mm.
+        components: (C, N, 3) mm, B; their coefficients have deviation 1.
         precision: (N, 3, 3) 1 / mm^2, of the deviations d.
     """
 
@@ -37,9 +38,12 @@ class Sightings:
     """M observations: photo m shows place n at image point x.
 
     Attributes:
-        photo, place: (M,). image_points: (M, 2) px. sigma_px: (M,).
-        guides: (M,) whether the cameras follow it. What slides over the face with the view, as
-            a detector's landmarks do, may tell the shape, but not the cameras.
+        photo: (M,).
+        place: (M,).
+        image_points: (M, 2) px.
+        sigma_px: (M,).
+        guides: (M,) whether the cameras follow it. What slides over the face with the view, as a
+            detector's landmarks do, may tell the shape, but not the cameras.
     """
 
     photo: Int[Array, " m"]
@@ -54,7 +58,9 @@ class Lenses:
     """Focal lengths: which photos share one, and what is known of each.
 
     Attributes:
-        group: (K,) index from 0. log_focal, deviation: (G,) mean and deviation of log(px).
+        group: (K,) index from 0.
+        log_focal: (G,) mean and deviation of log(px).
+        deviation: (G,) mean and deviation of log(px).
     """
 
     group: Int[Array, " k"]
@@ -80,7 +86,8 @@ class CameraPrior:
     """Beliefs about poses and focal lengths, each by itself.
 
     Attributes:
-        R: (K, 3, 3), t: (K, 3) mm, about which poses lie with POSE_SD. lenses: focal lengths.
+        R: (K, 3, 3), t: (K, 3) mm, about which poses lie with POSE_SD.
+        lenses: focal lengths.
     """
 
     R: Float[Array, "k 3 3"]
@@ -106,7 +113,9 @@ class JointState:
     """Values of all unknowns.
 
     Attributes:
-        R: (K, 3, 3), t: (K, 3) mm, log_focal: (G,). places: (N, 3) mm. coefficients: (C,).
+        R: (K, 3, 3), t: (K, 3) mm, log_focal: (G,).
+        places: (N, 3) mm.
+        coefficients: (C,).
     """
 
     R: Float[Array, "k 3 3"]

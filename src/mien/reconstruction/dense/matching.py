@@ -37,7 +37,8 @@ class Sight:
     """A crop with the surface behind its pixels.
 
     Attributes:
-        points: (H, W, 3) mm. facing: (H, W) cosine between normal and direction to the camera.
+        points: (H, W, 3) mm.
+        facing: (H, W) cosine between normal and direction to the camera.
         usable: (H, W) where the head is seen squarely enough.
     """
 
@@ -62,7 +63,8 @@ class Match:
     """Where the pixels of crop a lie in crop b.
 
     Attributes:
-        places: (H, W, 2) px of crop b. good: (H, W) seen in both and alike.
+        places: (H, W, 2) px of crop b.
+        good: (H, W) seen in both and alike.
     """
 
     places: Float[Array, "h w 2"]

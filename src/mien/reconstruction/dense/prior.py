@@ -28,7 +28,8 @@ class HeadPrior:
     """vertices = mean + coefficients . components, the coefficients independent with deviation 1.
 
     Attributes:
-        mean: (V, 3) mm. components: (C, V, 3) mm: the identity basis, then smooth modes.
+        mean: (V, 3) mm.
+        components: (C, V, 3) mm: the identity basis, then smooth modes.
         identity_count: how many of them are the identity basis.
     """
 
@@ -57,7 +58,8 @@ def make_head_prior(generic: GenericHead) -> HeadPrior:
     half of smaller variance. For a coordinate across the mirror the even modes of space make the
     asymmetric half, for the other two the odd ones do.
 
-    Source: Luethi et al., Gaussian Process Morphable Models, 2018; the split is ours.
+    Source:
+        Luethi et al., Gaussian Process Morphable Models, 2018; the split is ours.
     """
     even, odd = _spatial_modes(generic, +1), _spatial_modes(generic, -1)
     components = [generic.identity.components.astype(np.float64)]

@@ -20,7 +20,9 @@ class Pinholes:
     """K cameras as arrays.
 
     Attributes:
-        R: (K, 3, 3) R_cam_head. t: (K, 3) mm, t_cam_head. focal_px: (K,).
+        R: (K, 3, 3) R_cam_head.
+        t: (K, 3) mm, t_cam_head.
+        focal_px: (K,).
     """
 
     R: Float[Array, "k 3 3"]
@@ -44,7 +46,8 @@ class Projection:
     Attributes:
         image_points: (M, 2) px, less the principal point.
         by_place: (M, 2, 3) px / mm, derivatives by the place in head space.
-        turned: (M, 3) mm, R_cam_head times the place. by_turned: (M, 2, 3) derivatives by it.
+        turned: (M, 3) mm, R_cam_head times the place.
+        by_turned: (M, 2, 3) derivatives by it.
         depth: (M,) mm, the t_z of the photo.
     """
 
@@ -70,7 +73,8 @@ def project_places(
 ) -> Projection:
     """Place m, (M, 3) mm in head space, as photo[m] sees it.
 
-    Raises: EstimationError: a place lies behind its camera.
+    Raises:
+        EstimationError: a place lies behind its camera.
     """
     R, t = pinholes.R[photo], pinholes.t[photo]
     turned = (R @ places[..., None])[..., 0]

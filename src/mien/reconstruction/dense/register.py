@@ -61,7 +61,8 @@ class Registration:
     """What the photos together tell.
 
     Attributes:
-        cameras: one a photo. vertices: (V, 3) mm, in the prior's frame and scale.
+        cameras: one a photo.
+        vertices: (V, 3) mm, in the prior's frame and scale.
         deviation_mm: (V,) standard deviation of each vertex, all axes together.
         quality: what the photos say of each other.
     """
@@ -86,12 +87,15 @@ def register_views(
     """Cameras and shape from all the skin that the photos share, from coarse to fine.
 
     Args:
-        cameras, vertices: from landmarks, within some 15 degrees.
-        features: landmarks and marks of the same photos. Landmarks tell what place of the mesh
-            is which, and lead the camera of a photo that shares too little with the others; marks
-            lead all cameras, and the head passes through them in the end.
+        cameras: from landmarks, within some 15 degrees.
+        vertices: from landmarks, within some 15 degrees.
+        features: landmarks and marks of the same photos. Landmarks tell what place of the mesh is
+            which, and lead the camera of a photo that shares too little with the others; marks lead
+            all cameras, and the head passes through them in the end.
         scales: mm a px, from round to round.
-    Returns: None where the photos share too little that looks alike.
+
+    Returns:
+        None where the photos share too little that looks alike.
     """
     tell = progress or (lambda done, total: None)
     prior = load_head_prior()

@@ -39,7 +39,8 @@ class Offsets:
     """How far the photos put N places off the surface.
 
     Attributes:
-        along_normal: (N,) mm. sd: (N,) mm, by the errors of the image points alone.
+        along_normal: (N,) mm.
+        sd: (N,) mm, by the errors of the image points alone.
     """
 
     along_normal: Float[Array, " n"]
@@ -102,7 +103,9 @@ def sample_heights(
 ) -> Float[Array, "d v"]:
     """(D, V) mm: draws of what the offsets leave open of the skin's heights.
 
-    Source: perturb and solve (Papandreou and Yuille, 2010): with data and stiffness perturbed by
+    Source:
+        perturb and solve (Papandreou and Yuille, 2010): with data and stiffness perturbed by
+
     their own noise, the solutions scatter as the posterior does.
     """
     from scipy.sparse import diags_array
@@ -175,7 +178,8 @@ class _HeightProblem:
 
     Attributes:
         outer: (V,) which vertices are skin that shows; the others have no height.
-        stiffness: (V, V) sparse, root^T root; root: (R, V).
+        stiffness: (V, V) sparse, root^T root.
+        root: (R, V).
     """
 
     outer: Bool[Array, " v"]
@@ -199,7 +203,9 @@ class _HeightProblem:
 def _height_problem(generic: GenericHead) -> _HeightProblem:
     """Bending of a height field on the skin, and a spring that lets it fade far from all data.
 
-    Source: the thin plate on a mesh, L^T M^-1 L with cotangent Laplacian L and areas M
+    Source:
+        the thin plate on a mesh, L^T M^-1 L with cotangent Laplacian L and areas M
+
     (Botsch and Kobbelt, 2004).
     """
     from scipy.sparse import csr_array, diags_array, vstack

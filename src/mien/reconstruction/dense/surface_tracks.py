@@ -28,10 +28,13 @@ class Tracks:
     """N places on the mesh and M observations of them.
 
     Attributes:
-        corners: (N, 3) vertices of the triangle that holds the place; barycentrics: (N, 3) in it.
+        corners: (N, 3) vertices of the triangle that holds the place.
+        barycentrics: (N, 3) in it.
         reference: (N,) the photo in which the place was chosen, and observed exactly.
-        photo, place: (M,) what observation m shows, and where it is seen.
-        image_points: (M, 2) px of that photo. sigma_px: (M,) its error there.
+        photo: (M,) what observation m shows, and where it is seen.
+        place: (M,) what observation m shows, and where it is seen.
+        image_points: (M, 2) px of that photo.
+        sigma_px: (M,) its error there.
         crowding: (N,) how many places share a patch of the matching, and with it its error.
     """
 
@@ -82,8 +85,10 @@ def find_tracks(
     the way back from b to a agrees and both surroundings look alike.
 
     Args:
-        mesh: what the photos show (crops.visible_mesh). mm_per_px: scale at which to match.
-        places: about how many to follow, over all photos. fine: as in match_images.
+        mesh: what the photos show (crops.visible_mesh).
+        mm_per_px: scale at which to match.
+        places: about how many to follow, over all photos.
+        fine: as in match_images.
     """
     share = places / max(1, len(views))
     normals = mesh.vertex_normals()

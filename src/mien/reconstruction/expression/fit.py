@@ -51,7 +51,8 @@ class ExpressionFit:
         units: (52,) weights of the face units that explain it.
         gaze: (2, 2) rad, yaw and pitch of the left and the right eye beyond where they look in
             neutral.
-        photos: by photo name, those that fit. left_out: why, by photo name, the others did not.
+        photos: by photo name, those that fit.
+        left_out: why, by photo name, the others did not.
     """
 
     vertices: Float[Array, "v 3"]
@@ -71,9 +72,12 @@ def fit_expression(
     found again from the neutral photos; what is left moves the skin smoothly. Depth that the
     photos do not tell is the units'.
 
-    Raises: EstimationError: no photo can be used; says why, of each.
-    Source: P02 sec. 5.1 with the neutral head as the prior; the units and the dense matching are
-        ours.
+    Raises:
+        EstimationError: no photo can be used; says why, of each.
+
+    Source:
+        [Pighin 2002] sec. 5.1 with the neutral head as the prior; the units and the dense matching
+        are ours.
     """
     from threadpoolctl import threadpool_limits
 

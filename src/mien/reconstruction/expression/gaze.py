@@ -48,7 +48,9 @@ def direction_to_iris(
     A ray that misses the ball grazes it.
 
     Args:
-        image_point: (2,) px. centre: (3,) mm, head space. radius: mm.
+        image_point: (2,) px.
+        centre: (3,) mm, head space.
+        radius: mm.
     """
     ray = camera.ray_directions(image_point[None])[0]
     towards = centre - camera.center

@@ -28,7 +28,9 @@ class KnownHead:
     """A person's neutral head.
 
     Attributes:
-        views, cameras: the photos that it was fitted to. vertices: (V, 3) mm, head space.
+        views: the photos that it was fitted to.
+        cameras: the photos that it was fitted to.
+        vertices: (V, 3) mm, head space.
         units: (52, V, 3) mm, the face units of this head.
     """
 

@@ -43,7 +43,9 @@ def follow_skin(
     Args:
         vertices: (V, 3) mm, the expression as known so far.
         photo: number of the view among the expression's photos.
-    Returns: None where too little looks alike.
+
+    Returns:
+        None where too little looks alike.
     """
     nearest = _nearest(camera, known)
     still = visible_mesh(known.generic, known.vertices)

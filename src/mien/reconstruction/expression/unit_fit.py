@@ -26,7 +26,8 @@ class Explained:
     """What explains the photos of an expression.
 
     Attributes:
-        cameras: one a photo. weights: (52,) of the face units, 0 to 1.2.
+        cameras: one a photo.
+        weights: (52,) of the face units, 0 to 1.2.
     """
 
     cameras: tuple[Camera, ...]

@@ -34,7 +34,8 @@ class Alignment:
     """A painting matched with the photo.
 
     Attributes:
-        painting: as the camera sees it. camera: of the painting, which shows a part of the photo.
+        painting: as the camera sees it.
+        camera: of the painting, which shows a part of the photo.
         shifts: (H, W, 2) px from the painting to the photo.
         alike: (H, W) -1 to 1, how much a place's surroundings look like those that it was matched
             with; 0 where the painting knows nothing.
@@ -67,7 +68,8 @@ def align(
     """The photo matched with the head as the camera sees it; None where it hardly does.
 
     Args:
-        camera: of the photo, to within some 20 degrees. resolution: px of the painting per mm.
+        camera: of the photo, to within some 20 degrees.
+        resolution: px of the painting per mm.
     """
     import cv2
 

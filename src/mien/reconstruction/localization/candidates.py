@@ -31,7 +31,8 @@ class Look:
     """How the head looks from one side.
 
     Attributes:
-        camera: of the picture; looks at the head's center. keypoints: in it.
+        camera: of the picture; looks at the head's center.
+        keypoints: in it.
     """
 
     camera: Camera

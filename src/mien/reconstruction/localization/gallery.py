@@ -36,7 +36,8 @@ class Painting:
     """The head as a camera would show it, as far as the photos tell.
 
     Attributes:
-        grey: (H, W) uint8. known: (H, W) where some photo tells.
+        grey: (H, W) uint8.
+        known: (H, W) where some photo tells.
         places: (H, W, 3) mm of the surface behind each pixel, head space; NaN beside the head.
     """
 
@@ -48,7 +49,9 @@ class Painting:
 @dataclass(frozen=True)
 class _Known:
     """A reduced photo with its camera, the depth of its pixels, and how far (0 to 1) they are from
-    an edge."""
+
+    an edge.
+    """
 
     grey: Float[Array, "h w"]
     camera: Camera

@@ -21,7 +21,8 @@ class Keypoints:
     """N places of an image and what surrounds them.
 
     Attributes:
-        places: (N, 2) px. descriptors: (N, 128) of unit length.
+        places: (N, 2) px.
+        descriptors: (N, 128) of unit length.
     """
 
     places: Float[Array, "n 2"]
@@ -31,7 +32,8 @@ class Keypoints:
 def find_keypoints(grey: UInt8[Array, "h w"], mask: Bool[Array, "h w"] | None = None) -> Keypoints:
     """SIFT features, at most some thousand, the strongest.
 
-    Source: Lowe, Distinctive image features from scale-invariant keypoints, 2004; Arandjelovic and
+    Source:
+        Lowe, Distinctive image features from scale-invariant keypoints, 2004; Arandjelovic and
         Zisserman, Three things everyone should know, 2012 (the root of the descriptors).
     """
     import cv2

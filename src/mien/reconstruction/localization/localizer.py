@@ -52,7 +52,9 @@ def place_view(
     Args:
         others: photos of the same person with the same expression, and their cameras.
         vertices: (V, 3) mm, the head that those cameras belong to, head space.
-    Returns: the camera, good to a degree or two; None where there is no clear evidence for any.
+
+    Returns:
+        the camera, good to a degree or two; None where there is no clear evidence for any.
     """
     return _Placer(others, vertices, generic).place(view) if others else None
 

@@ -1,4 +1,4 @@
-"""P02's five linear steps, repeated until they settle, with acceleration that only ever helps."""
+"""[Pighin 2002]'s five linear steps, repeated until they settle, and accelerated."""
 
 from __future__ import annotations
 
@@ -34,9 +34,11 @@ class Alternation:
     """Where the five steps settled.
 
     Attributes:
-        poses, points: the unknowns.
+        poses: the unknowns.
+        points: the unknowns.
         cost: robust sum of squared reprojection errors, px^2.
-        sweeps: rounds of five steps. converged: whether they settled before the limit.
+        sweeps: rounds of five steps.
+        converged: whether they settled before the limit.
     """
 
     poses: Poses
@@ -66,10 +68,11 @@ def alternate(
     kept only if the next sweep finds a lower cost there, else the plain sweep's result is used.
 
     Args:
-        image: (K, N, 2) px relative to the principal points; weights: (K, N), relative
-            inverse variances, 0 unseen.
-        loss, sigma_px: robust loss, and the deviation per axis of an observation of weight 1.
-        history: sweeps that the acceleration remembers; 0 is P02's plain iteration.
+        image: (K, N, 2) px relative to the principal points.
+        weights: (K, N), relative inverse variances, 0 unseen.
+        loss: robust loss, and the deviation per axis of an observation of weight 1.
+        sigma_px: robust loss, and the deviation per axis of an observation of weight 1.
+        history: sweeps that the acceleration remembers; 0 is [Pighin 2002]'s plain iteration.
         tolerance: relative decrease of the cost over five sweeps at which they have settled.
     """
     anchor, frame = points, _Frame(poses, points)
@@ -105,8 +108,8 @@ def _sweep(
 ) -> tuple[Array, Poses, float]:
     """Points, the next poses, and the cost of these points under the poses given.
 
-    The order is P02's, s, m, R, t, eta, entered at m. Points seen once fit any pose and would only
-    hold the poses where they are, so they are left out of the cameras' steps.
+    The order is [Pighin 2002]'s, s, m, R, t, eta, entered at m. Points seen once fit any pose and
+    would only hold the poses where they are, so they are left out of the cameras' steps.
     """
     bend = _bend(poses, points, image, weights, loss, sigma_px)[1]
     points = step_points(poses, points, image, weights * bend, anchor)

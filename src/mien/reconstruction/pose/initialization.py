@@ -35,9 +35,12 @@ def estimate_poses(
     are tried with perspective, and the better is kept.
 
     Args:
-        image: (K, N, 2) px relative to the principal points; weights: (K, N), 0 unseen.
+        image: (K, N, 2) px relative to the principal points.
+        weights: (K, N), 0 unseen.
         points: (N, 3) mm, relative to a place in their midst.
-    Raises: EstimationError: a photo with fewer than four points, or all on one line.
+
+    Raises:
+        EstimationError: a photo with fewer than four points, or all on one line.
     """
     rotations = np.stack(
         [_scaled_rotation(x, w, points) for x, w in zip(image, weights, strict=True)]

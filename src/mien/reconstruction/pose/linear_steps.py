@@ -1,4 +1,4 @@
-"""P02's linear steps of pose recovery: each solves one group of unknowns, the others fixed.
+"""[Pighin 2002]'s linear steps of pose recovery: each solves for one group of unknowns.
 
 The unknowns of photo k are s = f eta (px/mm), R, t = (t_x, t_y) mm and eta = 1 / t_z (1/mm); those
 of point i are m_i (mm). With x the image point relative to the principal point, eq. (2) reads
@@ -42,7 +42,10 @@ class Poses:
     """The cameras' unknowns, one row a photo.
 
     Attributes:
-        s: (K,) px/mm, scale at the head. R: (K, 3, 3). t: (K, 2) mm. eta: (K,) 1/mm.
+        s: (K,) px/mm, scale at the head.
+        R: (K, 3, 3).
+        t: (K, 2) mm.
+        eta: (K,) 1/mm.
     """
 
     s: Float[Array, " k"]
@@ -72,7 +75,7 @@ class Poses:
 
 
 def reprojection(poses: Poses, points: Float[Array, "n 3"]) -> Float[Array, "k n 2"]:
-    """(K, N, 2) px relative to the principal points. Source: P02 below eq. (1)."""
+    """(K, N, 2) px relative to the principal points. Source: [Pighin 2002] below eq. (1)."""
     rotated = _rotated(poses, points)
     above = poses.s[:, None, None] * (rotated[..., :2] + poses.t[:, None])
     projected: Array = above / _depth(poses, rotated)[..., None]
@@ -111,7 +114,11 @@ def step_points(
 
 
 def step_rotation(poses: Poses, points: Array, image: Array, weights: Array) -> Poses:
-    """R of every photo, by an incremental rotation. Source: P02 app. A, eq. (12) to (14)."""
+    """R of every photo, by an incremental rotation.
+
+    Source:
+        [Pighin 2002] app. A, eq. (12) to (14).
+    """
     q, w = _rotated_and_w(poses, points, weights)
     s, eta = poses.s[:, None], poses.eta[:, None]
     x, y = image[..., 0], image[..., 1]

@@ -37,8 +37,10 @@ class PoseProblem:
     Attributes:
         image: (K, N, 2) px relative to the principal points, 0 where unseen.
         weights: (K, N), inverse variances with a median of 1, 0 where unseen.
-        points: (N, 3) mm relative to center. center: (3,) mm.
-        sizes: (K, 2) px. principal: (K, 2) px.
+        points: (N, 3) mm relative to center.
+        center: (3,) mm.
+        sizes: (K, 2) px.
+        principal: (K, 2) px.
     """
 
     image: Float[Array, "k n 2"]

@@ -1,4 +1,8 @@
-"""Cameras and feature points from their images in several photos (P02's pose recovery)."""
+"""Cameras and feature points from their images in several photos.
+
+Source:
+    [Pighin 2002]'s pose recovery.
+"""
 
 from __future__ import annotations
 
@@ -82,28 +86,36 @@ def recover_pose(
     max_sweeps: int = 300,
     tolerance: float = 1e-8,
 ) -> PoseResult:
-    """Cameras and points by P02's five alternating linear least squares.
+    """Cameras and points by [Pighin 2002]'s five alternating linear least squares.
 
     Each photo is first placed by itself on the initial shape (camera steps only), then all unknowns
-    are swept in P02's order, s, m, R, t_xy, eta. With a robust loss, observations that stay far off
-    are dropped and the rest is solved again by plain least squares. A photo that does not fit the
-    shape by itself, or that disagrees with the others, is left out and named in `problems`.
+    are swept in [Pighin 2002]'s order, s, m, R, t_xy, eta. With a robust loss, observations that
+    stay far off are dropped and the rest is solved again by plain least squares. A photo that does
+    not fit the shape by itself, or that disagrees with the others, is left out and named in
+    `problems`.
 
     Args:
         image_points: (K, N, 2) px, NaN where a photo does not show a point.
         points: (N, 3) mm, a rough shape, such as the generic head's.
         sizes: (K, 2) image width and height in px.
         principal_px: (K, 2); the image centres unless given.
-        rotations: (K, 3, 3) rough R_cam_head, P02's way of starting; estimated unless given.
+        rotations: (K, 3, 3) rough R_cam_head, [Pighin 2002]'s way of starting; estimated unless
+            given.
         focal_px: (K,) rough focal lengths, used only with rotations.
         weights: (K, N) >= 0, inverse variances of the observations up to a common factor.
-        loss: "cauchy" or "huber" guard against bad points; "linear" is P02's least squares.
-        history: sweeps that the acceleration remembers; 0 is P02's plain iteration.
+        loss: "cauchy" or "huber" guard against bad points; "linear" is [Pighin 2002]'s least
+            squares.
+        history: sweeps that the acceleration remembers; 0 is [Pighin 2002]'s plain iteration.
         max_misfit_mm: a photo whose points lie farther (robust deviation) off the initial shape's
             best view shows something else.
-    Raises: InputError: shapes, NaN, negative weights. EstimationError: no photo fits.
-    Source: P02 sec. 5.1.1, eq. (2), app. A. Differs in the start from single photos, the robust
-        weights, the acceleration and the verdicts; the steps are P02's.
+
+    Raises:
+        InputError: shapes, NaN, negative weights.
+        EstimationError: no photo fits.
+
+    Source:
+        [Pighin 2002] sec. 5.1.1, eq. (2), app. A. Differs in the start from single photos, the
+        robust weights, the acceleration and the verdicts; the steps are [Pighin 2002]'s.
     """
     problem = check_problem(image_points, points, sizes, principal_px, weights)
     settings = _Settings(loss, history, max_sweeps, tolerance)

@@ -35,11 +35,14 @@ def deform_head(
     moved and scaled as a whole.
 
     Args:
-        vertices: (V, 3) mm, the shape so far. places: (N, 3) mm, the features on it.
+        vertices: (V, 3) mm, the shape so far.
+        places: (N, 3) mm, the features on it.
         goals: (N, 3) mm, where they belong.
         deviation_mm: how well a goal is known; 0 meets it exactly.
         kernel: as in fit_rbf.
-    Source: P02 sec. 5.1.2, eq. (3); the anchors and the deviations are ours.
+
+    Source:
+        [Pighin 2002] sec. 5.1.2, eq. (3); the anchors and the deviations are ours.
     """
     anchors = _far_vertices(vertices, places, generic)
     centers = np.concatenate([places, vertices[anchors]])
@@ -95,7 +98,8 @@ def vertex_uncertainty(
     """(V,) mm: near a feature what is known of it, far from all what the prior leaves open.
 
     Args:
-        places: (N, 3) mm; deviation_mm: (N,) of the features there.
+        places: (N, 3) mm.
+        deviation_mm: (N,) of the features there.
         prior_mm: deviation of a place that nothing tells about.
         reach_mm: how far a feature speaks for its neighbourhood.
     """

@@ -35,7 +35,9 @@ def guide_features(
     """The head with eyelids, lips, brows and nose where landmarks show them.
 
     Args:
-        vertices: (V, 3) mm. features, cameras: of K photos.
+        vertices: (V, 3) mm.
+        features: of K photos.
+        cameras: of K photos.
         measured: the surface is known from several photos and stays where it is; else what one
             photo shows moves the head across it.
     """

@@ -1,4 +1,8 @@
-"""A head's shape from its feature points, the cameras fixed (P02 sec. 5.1.2 and 5.1.3)."""
+"""A head's shape from its feature points, the cameras fixed.
+
+Source:
+    [Pighin 2002] sec. 5.1.2 and 5.1.3.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +39,9 @@ def shape_from_features(
 
     Args:
         points: (N, 3) mm, where the features seen twice lie.
-    Source: P02 sec. 5.1.3, repeated; the identity basis beneath is ours.
+
+    Source:
+        [Pighin 2002] sec. 5.1.3, repeated; the identity basis beneath is ours.
     """
     twice = features.seen.sum(axis=0) > 1
     deviation = features.sigma_mm.min(axis=0)

@@ -98,7 +98,8 @@ def _stiffness(
 ) -> Any:
     """(3S, 3S) sparse: bending of the skin, and the springs that let a movement fade.
 
-    Source: the thin plate on a mesh, L^T M^-1 L (Botsch and Kobbelt, 2004).
+    Source:
+        the thin plate on a mesh, L^T M^-1 L (Botsch and Kobbelt, 2004).
     """
     from scipy.sparse import bsr_array, diags_array, eye_array, kron
 

@@ -60,7 +60,8 @@ def write_on(
     """The picture with a word on it.
 
     Args:
-        at: the word's middle, as shares of width and height. size: of the letters, px.
+        at: the word's middle, as shares of width and height.
+        size: of the letters, px.
         outline: dark, so many px wide, where one does not know what is behind the word.
     """
     from PIL import Image, ImageDraw

@@ -1,4 +1,4 @@
-"""Numbers of a track that are plotted together (P02 figs. 11 to 19)."""
+"""Numbers of a track that are plotted together ([Pighin 2002] figs. 11 to 19)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,9 @@ class Row:
 
     Attributes:
         label: with its unit.
-        values: (N,). deviations: (N,) one standard deviation. truth: (N,).
+        values: (N,).
+        deviations: (N,) one standard deviation.
+        truth: (N,).
         limits: that the plot shows at least.
     """
 
@@ -45,7 +47,10 @@ class Plot:
     """Numbers that belong together.
 
     Attributes:
-        name: of its file. title, caption: what it shows. rows: from top to bottom.
+        name: of its file.
+        title: what it shows.
+        caption: what it shows.
+        rows: from top to bottom.
         alike: whether all rows have one scale.
     """
 
@@ -140,7 +145,9 @@ def _rotation_plot(series: Series, truth: Series | None) -> Plot:
 
 def _quaternion_plot(series: Series, truth: Series | None) -> Plot:
     rows = _columns("xyzw", quaternions(series), None if truth is None else quaternions(truth))
-    caption = "The same as a quaternion (P02 fig. 15); 0, 0, 0, 1 looks straight at the camera."
+    caption = (
+        "The same as a quaternion ([Pighin 2002] fig. 15); 0, 0, 0, 1 looks straight at the camera."
+    )
     return Plot("quaternion", "Rotation as a quaternion", caption, tuple(rows))
 
 
@@ -149,7 +156,7 @@ def _translation_plot(series: Series, truth: Series | None) -> Plot:
     rows = _columns(labels, series.translations, None if truth is None else truth.translations)
     if truth is not None:
         rows.append(Row("error, %", translation_errors(series, truth), limits=(0, 0.2)))
-    caption = "Where the middle between the eyes is, in the camera's space (P02 fig. 16)."
+    caption = "Where the middle between the eyes is, in the camera's space ([Pighin 2002] fig. 16)."
     return Plot("translation", "Translation", caption, tuple(rows))
 
 

@@ -38,7 +38,8 @@ class DrawnFace:
     def over(self, pixels: UInt8[Array, "h w 3"]) -> UInt8[Array, "h w 3"]:
         """The frame with the face, and nothing else of the head, drawn over it; softly bordered.
 
-        Raises: InputError: a frame of another size than the picture.
+        Raises:
+            InputError: a frame of another size than the picture.
         """
         import cv2
 
@@ -57,7 +58,9 @@ def draw_tracked(
     Args:
         track: that the frame is of.
         camera: of a part of the frame or of another size; by default the track's own.
-    Raises: InputError: an expression or unit that the head does not have.
+
+    Raises:
+        InputError: an expression or unit that the head does not have.
     """
     if found.state is None:
         return None
@@ -76,7 +79,9 @@ def face_psnr(
     Args:
         drawn: (h, w, 3), or (h, w, 4) of which alpha does not count.
         mask: such as DrawnFace.inside without what covers the face.
-    Raises: InputError: sizes that differ.
+
+    Raises:
+        InputError: sizes that differ.
     """
     frame, other = _check_size("pixels", pixels, mask), _check_size("drawn", drawn[..., :3], mask)
     if not mask.any():

@@ -51,8 +51,11 @@ def save_figure(path: str | Path, plot: Plot, series: Series) -> None:
     """Write a plot, whole or not at all.
 
     Args:
-        path: .png or .svg. series: that the plot is of.
-    Raises: InputError: a place that cannot be written.
+        path: .png or .svg.
+        series: that the plot is of.
+
+    Raises:
+        InputError: a place that cannot be written.
     """
     import matplotlib
 
@@ -145,7 +148,9 @@ def _add_legend(figure: Figure, plot: Plot, series: Series, top: float) -> None:
 
 def limits_of(plot: Plot) -> list[tuple[float, float]]:
     """What every row shows, from lowest to highest: all of its numbers and of the truth; a
-    deviation, where hardly anything is known, may reach out of it."""
+
+    deviation, where hardly anything is known, may reach out of it.
+    """
     found = []
     for row in plot.rows:
         shown = np.concatenate([row.values, () if row.truth is None else row.truth])

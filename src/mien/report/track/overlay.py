@@ -46,11 +46,17 @@ def write_overlay(
     variable rate or where frames are missing, is repeated, so that all keep their times.
 
     Args:
-        path: .mp4 or .webm. video: that was tracked; it is decoded again.
+        path: .mp4 or .webm.
+        video: that was tracked; it is decoded again.
         progress: told the tracked frames done and their total.
-    Returns: how many frames were written.
-    Raises: InputError: another suffix, a video of another size than the track's, one without any
-        of its frames, a place that cannot be written. FileFormatError: not a video.
+
+    Returns:
+        how many frames were written.
+
+    Raises:
+        InputError: another suffix, a video of another size than the track's, one without any of its
+            frames, a place that cannot be written.
+        FileFormatError: not a video.
     """
     fps, counts = held(np.array([found.time for found in track.frames]), track.fps)
 
@@ -71,6 +77,7 @@ def overlay_frames(
     head: Head | HeadRenderer,
 ) -> Iterator[UInt8[Array, "h w 3"]]:
     """For every frame a picture of it, beside it the frame with the drawn face over it, beside
+
     that the drawn head alone; a caption below. A lost frame is alone.
 
     Frames too large to stand side by side within 1920 px are cut to where the head goes in the
@@ -94,7 +101,9 @@ def decoded(
 ) -> Generator[tuple[UInt8[Array, "h w 3"], TrackedFrame]]:
     """The frames of a video that a track is of, with what was found in them.
 
-    Raises: InputError: a video of another size. FileFormatError: not a video.
+    Raises:
+        InputError: a video of another size.
+        FileFormatError: not a video.
     """
     by_number = {found.frame: found for found in track.frames}
     last = max(by_number, default=-1)
@@ -117,6 +126,7 @@ def _pixels(frame: Frame, path: Path, track: Track) -> UInt8[Array, "h w 3"]:
 
 def held(times: Float[Array, " n"], fps: float) -> tuple[float, Int[Array, " n"]]:
     """A constant rate, and how often it shows each frame for all to keep their times; once at
+
     least.
 
     Args:

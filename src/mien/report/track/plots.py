@@ -44,7 +44,7 @@ def write_track_plots(
     kind: str = "png",
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[Path, ...]:
-    """Write plots like P02's figs. 10 to 19 and a page that shows them, each whole or not at all.
+    """Write plots like [Pighin 2002]'s figs. 10 to 19 and a page of them, each whole or not at all.
 
     Args:
         folder: made if there is none; other files in it are left alone.
@@ -53,9 +53,14 @@ def write_track_plots(
         video: that was tracked, and `head`: both for a contact sheet; without them there is none.
         kind: "png" or "svg".
         progress: told the files written and their total.
-    Returns: the files, the page last.
-    Raises: InputError: a track without frames, another kind, as decoded, a place that cannot be
-        written. FileFormatError: not a video.
+
+    Returns:
+        the files, the page last.
+
+    Raises:
+        InputError: a track without frames, another kind, as decoded, a place that cannot be
+            written.
+        FileFormatError: not a video.
     """
     if not track.frames:
         raise InputError("track", "at least one frame", "none")
@@ -75,7 +80,8 @@ def write_track_plots(
 def check_plots_place(folder: str | Path) -> None:
     """Refuse, before any work is done, a folder whose index.html is another's.
 
-    Raises: InputError: that; a place that cannot be written.
+    Raises:
+        InputError: that; a place that cannot be written.
     """
     page = Path(folder) / PAGE
     if page.is_file() and _GENERATOR.encode() not in page.read_bytes():

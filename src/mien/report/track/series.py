@@ -18,11 +18,15 @@ class Series:
     """A track's numbers, NaN where the face was lost.
 
     Attributes:
-        numbers: (N,) of the frames. status: (N,).
-        rms, seen: (N,) as TrackedFrame's.
-        rotations: (N, 3, 3) R_cam_head. angles: (N, 3) degrees of yaw, pitch and roll.
+        numbers: (N,) of the frames.
+        status: (N,).
+        rms: (N,) as TrackedFrame's.
+        seen: (N,) as TrackedFrame's.
+        rotations: (N, 3, 3) R_cam_head.
+        angles: (N, 3) degrees of yaw, pitch and roll.
         translations: (N, 3) mm.
-        values, deviations: (N,) by channel.
+        values: (N,) by channel.
+        deviations: (N,) by channel.
     """
 
     numbers: Int[Array, " n"]

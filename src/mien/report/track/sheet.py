@@ -1,4 +1,8 @@
-"""A contact sheet: frames of a video above, what was found in them below (P02 figs. 10 and 17)."""
+"""A contact sheet: frames of a video above, what was found in them below.
+
+Source:
+    [Pighin 2002] figs. 10 and 17.
+"""
 
 from __future__ import annotations
 

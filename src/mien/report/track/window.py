@@ -20,8 +20,11 @@ class Window:
     """The part of a video's frames that is shown, and how large.
 
     Attributes:
-        left, top, right, bottom: px of the video. factor: size of a shown pixel's side over a
-            video's.
+        left: px of the video.
+        top: px of the video.
+        right: px of the video.
+        bottom: px of the video.
+        factor: size of a shown pixel's side over a video's.
     """
 
     left: int

@@ -65,7 +65,8 @@ class Mechanics:
         look: how the eyes turn.
         contacts: what must not pass through what.
         offsets: of the units; the eyeLook units' leave the eyeballs to be turned.
-        jaw, close: which units jawOpen and mouthClose are.
+        jaw: which units jawOpen and mouthClose are.
+        close: which units jawOpen and mouthClose are.
     """
 
     look: Look
@@ -84,7 +85,8 @@ class Mechanics:
     ) -> Mechanics:
         """For a head with these neutral vertices and unit offsets, mm.
 
-        Raises: InputError: shape, NaN.
+        Raises:
+            InputError: shape, NaN.
         """
         units = check_array("units", units, generic.unit_offsets.shape)
         vertices = check_array("vertices", vertices, generic.mesh.vertices.shape)
@@ -125,7 +127,9 @@ def fit_units(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[Arra
 
     Args:
         vertices: (V, 3) mm, head space, the generic topology.
-    Raises: InputError: shape, NaN.
+
+    Raises:
+        InputError: shape, NaN.
     """
     units = transfer_units(generic, vertices)
     units = close_lids(generic, vertices, turn_eyeballs(generic, vertices, units))

@@ -72,7 +72,13 @@ def move_apart(
 
     Args:
         points: on the lids, told as in places_of; the edges first.
-        upper, lower, share, on_upper, least, full_overlap, in_front: of rig.contacts.lids.Lids.
+        upper: of rig.contacts.lids.Lids.
+        lower: of rig.contacts.lids.Lids.
+        share: of rig.contacts.lids.Lids.
+        on_upper: of rig.contacts.lids.Lids.
+        least: of rig.contacts.lids.Lids.
+        full_overlap: of rig.contacts.lids.Lids.
+        in_front: of rig.contacts.lids.Lids.
         firmness: how firmly lids lie on each other that overlap by a radian too much.
         moves: (L, 3) zeros, where to write.
     """

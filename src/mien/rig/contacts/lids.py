@@ -45,8 +45,9 @@ class Lids:
     Attributes:
         eyeball: where it is when the face is neutral.
         vertices: (L,) the skin on and around the lids, the edges first: upper, then lower.
-        upper, lower: how many vertices the upper and the lower edge have, from the inner to the
-            outer corner, both of which are in both.
+        upper: how many vertices the upper and the lower edge have, from the inner to the outer
+            corner, both of which are in both.
+        lower: as `upper`.
         share: (L,) how far a correction of the nearer edge goes along.
         on_upper: (L,) whether that is the upper one.
         least: (L,) radius below which a vertex is in the eyeball; its own at rest if that is less;

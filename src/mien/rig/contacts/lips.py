@@ -31,7 +31,8 @@ class Lip:
     """The upper or the lower lip, from its skin around the red to its back.
 
     Attributes:
-        vertices: (P,) of the mesh. triangles: (F, 3) into them.
+        vertices: (P,) of the mesh.
+        triangles: (F, 3) into them.
         border: (P,) where it ends.
         tested: (T,) those that can get into the other lip.
         spread: (P, T) how far a correction of a tested vertex goes along; 1 at itself.
@@ -117,7 +118,8 @@ def part_lips(
     mouthClose is made for an open jaw and is corrected together with jawOpen.
 
     Args:
-        vertices: (V, 3) mm, the neutral face. units: (52, V, 3) mm.
+        vertices: (V, 3) mm, the neutral face.
+        units: (52, V, 3) mm.
     """
     lips = Lips.of(generic, vertices)
     result = np.asarray(units, np.float64).copy()

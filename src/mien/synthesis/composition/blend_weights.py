@@ -17,10 +17,12 @@ class FadeMap(NamedTuple):
     """The R subregions and, last, what is around them. Most places have one, few more than three.
 
     Attributes:
-        width, height: of the standard image.
-        codes: (h * w,) row after row: which set of subregions counts somewhere between a pixel
-            and those right of it and below.
-        starts: (S + 1,) where each set begins in `members`. members: indices of subregions.
+        width: of the standard image.
+        height: of the standard image.
+        codes: (h * w,) row after row: which set of subregions counts somewhere between a pixel and
+            those right of it and below.
+        starts: (S + 1,) where each set begins in `members`.
+        members: indices of subregions.
         holds: (S, R + 1) the same as a table.
         planes: (R + 1, h * w) fades, FADE_UNIT is all; they sum to it.
     """

@@ -23,17 +23,19 @@ __all__ = ["Composer"]
 class Composer:
     """Draws expressions of one person into the neutral photo.
 
-    Where the paper aligns examples to the standard image, mixes there and warps the mixture to
-    the new points (Z06 sections 6 and 7), each photo is looked up here where the target's pixel
-    lies in it, and the shares are looked up in the standard image: colours are resampled once.
-    Around the subregions, out to the triangulation's frame, the neutral photo is looked up in the
-    same way: hair and neck follow the jaw. From the frame on it moves with the head.
+    Where the paper aligns examples to the standard image, mixes there and warps the mixture to the
+    new points ([Zhang 2006] sections 6 and 7), each photo is looked up here where the target's
+    pixel lies in it, and the shares are looked up in the standard image: colours are resampled
+    once. Around the subregions, out to the triangulation's frame, the neutral photo is looked up in
+    the same way: hair and neck follow the jaw. From the frame on it moves with the head.
 
     Args:
         examples: photos, their points and the subregions.
         skip: shares up to this are left out, and the others are scaled to the same sum. A value
             changes by less than 255 * 2 * skip * number of examples.
-    Raises: InputError: a photo without two rows and columns, a negative skip.
+
+    Raises:
+        InputError: a photo without two rows and columns, a negative skip.
     """
 
     def __init__(self, examples: ExampleSet, *, skip: float = 1 / 256) -> None:
@@ -57,8 +59,13 @@ class Composer:
 
         Args:
             points: (n, 2) px of the other photo.
-        Raises: InputError: shape, NaN. EstimationError: rigid points in one place.
-        Source: Z06 eq. (8), (9). All points would take an open jaw for a head that nods.
+
+        Raises:
+            InputError: shape, NaN.
+            EstimationError: rigid points in one place.
+
+        Source:
+            [Zhang 2006] eq. (8), (9). All points would take an open jaw for a head that nods.
         """
         points = check_array("points", points, self._neutral_points.shape)
         rigid = self._layout.rigid
@@ -82,9 +89,15 @@ class Composer:
             size: width and height of the picture; the neutral photo's unless given. Beyond its
                 edges the neutral photo goes on as `with_surroundings` has it.
             out: memory to draw into.
-        Returns: (h, w, 3) sRGB; the same in any number of threads.
-        Raises: InputError: shapes, NaN, rows that do not sum to 1.
-        Source: Z06 eq. (6), (7), (8).
+
+        Returns:
+            (h, w, 3) sRGB; the same in any number of threads.
+
+        Raises:
+            InputError: shapes, NaN, rows that do not sum to 1.
+
+        Source:
+            [Zhang 2006] eq. (6), (7), (8).
         """
         points = check_array("points", points, self._neutral_points.shape)
         mixtures = self._mixtures(coefficients)

@@ -81,7 +81,9 @@ def draw_rows(
     """Draw what the triangles cover of some rows.
 
     Args:
-        corners, triangles, maps: as `mien.numeric.raster.piecewise_affine` has them.
+        corners: as `mien.numeric.raster.piecewise_affine` has them.
+        triangles: as `mien.numeric.raster.piecewise_affine` has them.
+        maps: as `mien.numeric.raster.piecewise_affine` has them.
         standard: which photo is the standard image.
         out: (h, w, 3) uint8.
     """

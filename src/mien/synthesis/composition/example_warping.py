@@ -1,4 +1,4 @@
-"""Examples drawn where the standard image's points are (Z06 section 5.2)."""
+"""Examples drawn where the standard image's points are ([Zhang 2006] section 5.2)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ def aligned_photos(examples: ExampleSet) -> Iterator[UInt8[Array, "h w 4"]]:
 
     Mien itself does not use these: it looks every photo up once, where the result needs it.
 
-    Yields: (h, w, 4) sRGB and alpha, of the standard photo's size.
+    Yields:
+        (h, w, 4) sRGB and alpha, of the standard photo's size.
     """
     layout = examples.layout
     standard = examples.examples[examples.standard]

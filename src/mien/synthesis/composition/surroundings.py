@@ -20,7 +20,8 @@ def with_surroundings(photo: UInt8[Array, "h w 3"]) -> tuple[UInt8[Array, "k l 3
     Pixels of the edge that are merely repeated are stripes: under shoulders, over a hairdo. Here
     they are blurred along the edge, the more the farther away, and not at all beside the photo.
 
-    Returns: the larger picture; how many px were put on each side.
+    Returns:
+        the larger picture; how many px were put on each side.
     """
     height, width = photo.shape[:2]
     margin = int(np.ceil(_MARGIN * max(height, width)))

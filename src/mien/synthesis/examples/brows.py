@@ -46,7 +46,8 @@ def detected_points(
 ) -> Float[Array, "n 2"]:
     """A face's feature points, px: the landmarks' mixes, brows moved to where they are seen.
 
-    Raises: InputError: shapes, NaN.
+    Raises:
+        InputError: shapes, NaN.
     """
     return on_brows(layout, pixels, layout.from_landmarks(landmarks))
 

@@ -26,8 +26,12 @@ class Example:
         photo: (h, w, 3) sRGB.
         points: (n, 2) px of the photo; those of a face that its photo cuts may lie outside.
         source: the file or the frame that it was taken from.
-    Raises: InputError: not an image; shape of the points, NaN.
-    Source: Z06 section 3.
+
+    Raises:
+        InputError: not an image; shape of the points, NaN.
+
+    Source:
+        [Zhang 2006] section 3.
     """
 
     name: str
@@ -55,9 +59,13 @@ class ExampleSet:
         subregions: over the standard example's photo.
         teeth: the examples that the teeth are made from; all where none is named. Those with a
             closed mouth have none to show.
-    Raises: InputError: no example, two of one name, points of another layout, no such `standard`
-        or teeth, subregions that are drawn over a picture of another size or another layout.
-    Source: Z06 sections 5 and 8.
+
+    Raises:
+        InputError: no example, two of one name, points of another layout, no such `standard` or
+            teeth, subregions that are drawn over a picture of another size or another layout.
+
+    Source:
+        [Zhang 2006] sections 5 and 8.
     """
 
     layout: FeatureLayout
@@ -98,7 +106,11 @@ class ExampleSet:
 
     @property
     def only(self) -> dict[str, tuple[int, ...]]:
-        """The subregions that some of the examples are for, by name, and which (Z06 section 8)."""
+        """The subregions that some of the examples are for, by name, and which.
+
+        Source:
+            [Zhang 2006] section 8.
+        """
         return {"teeth": self.teeth}
 
     @cached_property
@@ -112,9 +124,16 @@ class ExampleSet:
 
         Args:
             points: (..., n, 2) px of one photo each.
-        Returns: (..., n, 2) px of the neutral photo.
-        Raises: InputError: shape, NaN. EstimationError: all points in one place.
-        Source: Z06 section 12, eq. (8), (9).
+
+        Returns:
+            (..., n, 2) px of the neutral photo.
+
+        Raises:
+            InputError: shape, NaN.
+            EstimationError: all points in one place.
+
+        Source:
+            [Zhang 2006] section 12, eq. (8), (9).
         """
         geometries, _ = compensated(points, self.neutral.points)
         return geometries

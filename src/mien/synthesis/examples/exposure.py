@@ -42,7 +42,8 @@ def exposure_gains(layout: FeatureLayout, examples: Sequence[Example]) -> Float[
     The median over the face, place by place, of those neither nearly black nor clipped: eyes,
     mouth and the shades of wrinkles do not count.
 
-    Returns: (m, 3), for red, green and blue; 1 for the first, and where nothing can be compared.
+    Returns:
+        (m, 3), for red, green and blue; 1 for the first, and where nothing can be compared.
     """
     first = examples[0].points
     low, extent = first.min(axis=0), np.ptp(first, axis=0)

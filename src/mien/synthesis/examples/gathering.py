@@ -45,8 +45,10 @@ class Wishes:
     """What the user wants otherwise; rows of the series.
 
     Attributes:
-        neutral: the face at rest. standard: whose picture subregions are drawn in.
-        include: examples whatever they are like. exclude: pictures not to be used at all.
+        neutral: the face at rest.
+        standard: whose picture subregions are drawn in.
+        include: examples whatever they are like.
+        exclude: pictures not to be used at all.
     """
 
     neutral: int | None = None
@@ -120,7 +122,9 @@ def plan_examples(
         unfit: why a picture cannot be an example, "" where it can; none: all can.
         count: of examples at most.
         different: times the detector's noise that an example must differ by from all others.
-    Raises: InputError: as choose_examples.
+
+    Raises:
+        InputError: as choose_examples.
     """
     wishes = wishes or Wishes()
     neutral = _at_rest(series, unfit, wishes)

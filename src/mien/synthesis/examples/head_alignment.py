@@ -21,11 +21,19 @@ def compensated(
     Args:
         points: (..., N, 2) px, of faces with expressions.
         neutral: (N, 2) px, the same points of the neutral face; N >= 2.
-        by: indices of the points that tell the motion; all unless given. Displacements learned
-            from and those of a few points to be completed must be told by the same.
-    Returns: (..., N, 2) px of the neutral face's image; the motion from there to the points.
-    Raises: InputError, EstimationError: as `estimate_planar_motion`.
-    Source: Z06 sec. 12, T^-1(x') after eq. (9); less the neutral points it is the displacement.
+        by: indices of the points that tell the motion; all unless given. Displacements learned from
+            and those of a few points to be completed must be told by the same.
+
+    Returns:
+        (..., N, 2) px of the neutral face's image; the motion from there to the points.
+
+    Raises:
+        InputError: as `estimate_planar_motion`.
+        EstimationError: as `estimate_planar_motion`.
+
+    Source:
+        [Zhang 2006] sec. 12, T^-1(x') after eq. (9); less the neutral points it is the
+        displacement.
     """
     neutral = check_array("neutral", neutral, (None, 2))
     points = check_array("points", points, (*np.shape(points)[:-2], *neutral.shape))

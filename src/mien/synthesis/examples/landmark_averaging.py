@@ -40,8 +40,12 @@ def steady_points(
     Args:
         landmarks: (478, 2) px, from a single look.
         turns: degrees, each as it is and mirrored; one look in some 10 ms each.
-    Returns: (n, 2) px; the single look's where no other finds the face.
-    Raises: InputError: no image, shapes, NaN, a face without width.
+
+    Returns:
+        (n, 2) px; the single look's where no other finds the face.
+
+    Raises:
+        InputError: no image, shapes, NaN, a face without width.
     """
     check_image("pixels", pixels)
     once = layout.from_landmarks(landmarks)

@@ -25,7 +25,8 @@ def unfit_reasons(
     out for it.
 
     Args:
-        points: px of each picture. sizes: their widths and heights.
+        points: px of each picture.
+        sizes: their widths and heights.
         covered: whether something is before the face.
     """
     widths = np.ptp(points[..., 0], axis=1)

@@ -37,7 +37,9 @@ class ExampleCandidates:
         pose: (N, 2) yaw and pitch, radians.
         names: of the pictures, for reasons; "candidate 12" where there are none.
         unfit: why a picture cannot be an example, known beforehand; empty where it can.
-    Raises: InputError: shapes, NaN.
+
+    Raises:
+        InputError: shapes, NaN.
     """
 
     geometries: Float[Array, "N n 2"]
@@ -111,15 +113,19 @@ def choose_examples(
     Args:
         regions: name of each subregion and the indices of its points.
         neutral: the row of the face at rest, chosen whatever its picture is like.
-        count: of examples at most; fewer when all others are left out or are like a chosen one.
-            The paper has 10 to 15.
+        count: of examples at most; fewer when all others are left out or are like a chosen one. The
+            paper has 10 to 15.
         least: px, root mean square over the points of a subregion; a photo that differs from a
             chosen one by less in every subregion is like it.
         max_turn: yaw or pitch away from neutral, radians, that an example may have at most.
         wanted: rows that are chosen whatever they are like, with the reason.
         exclude: rows that are not.
-    Raises: InputError: no such row, count not positive, a region without points.
-    Source: Z06 section 14, "sufficiently different from each other while covering all".
+
+    Raises:
+        InputError: no such row, count not positive, a region without points.
+
+    Source:
+        [Zhang 2006] section 14, "sufficiently different from each other while covering all".
     """
     total = len(candidates.geometries)
     wanted = {neutral: "neutral"} | (wanted or {})

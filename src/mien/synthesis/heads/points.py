@@ -1,4 +1,4 @@
-"""Feature points on the mesh of a head, and how its skin follows them (Z06 section 9)."""
+"""Feature points on the mesh of a head, and how its skin follows them ([Zhang 2006] section 9)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ def skin_with_points() -> Float[Array, "v n"]:
     lies behind lips and lids, and lashes and hair, go along with the skin next to them: bent as
     little as the skin is, a socket would go on as its lid begins, and out through the cheek.
 
-    Source: the thin plate on a mesh, L^T M^-1 L (Botsch and Kobbelt, 2004).
+    Source:
+        the thin plate on a mesh, L^T M^-1 L (Botsch and Kobbelt, 2004).
     """
     from scipy.sparse import csc_array, diags_array
     from scipy.sparse.linalg import splu

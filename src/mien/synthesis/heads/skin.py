@@ -29,7 +29,9 @@ def spread_over_skin(values: Float[Array, "v k"], known: Bool[Array, " v"]) -> F
     Args:
         values: (V, K) of the generic head's vertices.
         known: (V,) the skin vertices whose values hold.
-    Returns: (V, K), nowhere beyond the values that are known; what is neither is as it was.
+
+    Returns:
+        (V, K), nowhere beyond the values that are known; what is neither is as it was.
     """
     from scipy.sparse import coo_array, diags_array
     from scipy.sparse.linalg import splu

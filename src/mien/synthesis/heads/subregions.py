@@ -1,4 +1,4 @@
-"""The subregions of the face on the mesh of a head (Z06 section 9)."""
+"""The subregions of the face on the mesh of a head ([Zhang 2006] section 9)."""
 
 from __future__ import annotations
 

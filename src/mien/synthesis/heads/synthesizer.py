@@ -1,4 +1,4 @@
-"""A head's expressions from feature points in space (Z06 section 9)."""
+"""A head's expressions from feature points in space ([Zhang 2006] section 9)."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class HeadSynthesis:
         face: shape, and whose texture shows how much where.
         points: (n, 3) mm, head space, as they were asked for.
         coefficients: (R, K) share of each photographed expression in each subregion.
-        hull_mm: (R,) root of the mean squared distance of each subregion's points from those of
-            the mix that it was made from.
+        hull_mm: (R,) root of the mean squared distance of each subregion's points from those of the
+            mix that it was made from.
     """
 
     face: PosedFace
@@ -69,8 +69,12 @@ class HeadSynthesizer:
         reach: whether skin and eyes are moved on to where the points were asked for, as pictures
             are warped; the paper leaves them where the mix of examples has them.
         rig: of the head, if there is one already.
-    Raises: InputError: as `Rig`.
-    Source: Z06 sections 6, 7, 9, 10.
+
+    Raises:
+        InputError: as `Rig`.
+
+    Source:
+        [Zhang 2006] sections 6, 7, 9, 10.
     """
 
     def __init__(
@@ -100,9 +104,15 @@ class HeadSynthesizer:
         Args:
             known: indices of points, none twice.
             positions: (k, 3) mm, head space.
-        Returns: (n, 3) mm; the known points exactly where they were given.
-        Raises: InputError: no points, unknown or repeated ones, shapes, NaN.
-        Source: Z06 section 10.
+
+        Returns:
+            (n, 3) mm; the known points exactly where they were given.
+
+        Raises:
+            InputError: no points, unknown or repeated ones, shapes, NaN.
+
+        Source:
+            [Zhang 2006] section 10.
         """
         neutral = self.examples[0]
         known, positions = check_known(known, positions, *neutral.shape)
@@ -118,8 +128,12 @@ class HeadSynthesizer:
 
         Args:
             points: (n, 3) mm, head space, all that the layout has.
-        Raises: InputError: shape, NaN.
-        Source: Z06 sections 6, 7, 9: vertices and colours are mixed alike.
+
+        Raises:
+            InputError: shape, NaN.
+
+        Source:
+            [Zhang 2006] sections 6, 7, 9: vertices and colours are mixed alike.
         """
         points = check_array("points", points, (len(self.layout.names), 3))
         apart, options = self.examples - points, self._options

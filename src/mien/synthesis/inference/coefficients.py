@@ -64,17 +64,24 @@ def coefficients(
     Args:
         points: (n, 2) px of any photo, all that the layout has.
         distance_penalty: the paper has 0. Beyond it, what an example costs by its squared distance
-            from the geometry asked for, those being 1 in the mean: of two mixes that fit alike,
-            the one of near examples wins: 0.0 to 0.3 dB by the mean of the frames on six halves
-            of four clips. 0.2 takes up to 0.3 dB again and leaves more detail.
+            from the geometry asked for, those being 1 in the mean: of two mixes that fit alike, the
+            one of near examples wins: 0.0 to 0.3 dB by the mean of the frames on six halves of four
+            clips. 0.2 takes up to 0.3 dB again and leaves more detail.
         together: groups of subregions, by name, that get the same shares, from all their points;
             the paper has none: (). Unless given, `BROWS` where there are such subregions.
         slack: how far below 0 shares may fall; the paper has 0. More leaves the convex hull. With
             40 examples 0.01 gives 0.1 dB on one clip and takes 1 on two; 0.05 takes 2 to 4 on all.
-    Returns: (R, m) shares; each row sums to 1.
-    Raises: InputError: shape, NaN, a negative penalty, a group that names no subregion or shares
-        one with another. EstimationError: all points in one place.
-    Source: Z06 section 6, eq. (2) to (5).
+
+    Returns:
+        (R, m) shares; each row sums to 1.
+
+    Raises:
+        InputError: shape, NaN, a negative penalty, a group that names no subregion or shares one
+            with another.
+        EstimationError: all points in one place.
+
+    Source:
+        [Zhang 2006] section 6, eq. (2) to (5).
     """
     return coefficients_of(
         apart_from(example_set, points),
@@ -100,12 +107,18 @@ def coefficients_of(
     Args:
         apart: (m, n, d) the examples' geometries relative to the one asked for.
         subregions: whose members are some of the n points.
-        distance_penalty, slack, together: as for `coefficients`.
+        distance_penalty: as for `coefficients`.
+        slack: as for `coefficients`.
+        together: as for `coefficients`.
         only: the examples that a subregion is made from where they are near: teeth from those that
             show teeth, unless the mouth is shut. In between it is made from both, so that a mouth
             that opens does so without a jump. Not of those together with others.
-    Raises: InputError: as `coefficients`.
-    Source: Z06 section 6, eq. (2) to (5), section 9.
+
+    Raises:
+        InputError: as `coefficients`.
+
+    Source:
+        [Zhang 2006] section 6, eq. (2) to (5), section 9.
     """
     if not 0 <= distance_penalty < np.inf:
         raise InputError("distance_penalty", "a number of at least 0", distance_penalty)
@@ -156,8 +169,11 @@ def distances_of(
     """How far the mixes of examples are from the geometry asked for.
 
     Args:
-        apart: as for `coefficients_of`. shares: of the examples in each subregion.
-    Returns: (R,) root of the mean squared distance of each subregion's points.
+        apart: as for `coefficients_of`.
+        shares: of the examples in each subregion.
+
+    Returns:
+        (R,) root of the mean squared distance of each subregion's points.
     """
     missed = np.tensordot(shares, apart, axes=1)
     squares = (missed**2).sum(axis=2)
@@ -186,9 +202,12 @@ def hull_distances(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Floa
 
     Args:
         points: (n, 2) px of any photo.
-    Returns: (R,) root of the mean squared distance of the subregion's points, px of the neutral
-        photo.
-    Raises: as `coefficients`.
+
+    Returns:
+        (R,) root of the mean squared distance of the subregion's points, px of the neutral photo.
+
+    Raises:
+        as `coefficients`.
     """
     apart = apart_from(example_set, points)
     shares = coefficients_of(apart, example_set.subregions, distance_penalty=0.0, together=())
@@ -200,7 +219,10 @@ def apart_from(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Float[Ar
 
     Args:
         points: (n, 2) px of any photo.
-    Raises: InputError: shape, NaN. EstimationError: all points in one place.
+
+    Raises:
+        InputError: shape, NaN.
+        EstimationError: all points in one place.
     """
     points = check_array("points", points, (len(example_set.layout.names), 2))
     apart: Array = example_set.geometries - example_set.geometry(points)

@@ -35,16 +35,20 @@ class ConditionalMotion:
     (within 0.01 px; 0.03 from 17 points on).
 
     Args:
-        statistics: (N, n, d) displacements from the neutral face of expressions of the same
-            person, head motion compensated, px in a picture and mm in space; N >= 2.
+        statistics: (N, n, d) displacements from the neutral face of expressions of the same person,
+            head motion compensated, px in a picture and mm in space; N >= 2.
         components: how many principal components are kept.
         least_noise: px or mm, the least that is taken for the noise: statistics that their
             components explain wholly do not make the given points beyond doubt.
         places: (n, 2) where the points are on a face, in widths of it.
         most: deviations up to which what is given is usual.
-    Raises: InputError: shapes, NaN, too few statistics, options out of their range.
-    Source: Tipping and Bishop, Probabilistic principal component analysis, JRSS B 1999, for the
-        model; the reference for Z06 sec. 10.
+
+    Raises:
+        InputError: shapes, NaN, too few statistics, options out of their range.
+
+    Source:
+        Tipping and Bishop, Probabilistic principal component analysis, JRSS B 1999, for the model;
+        the reference for [Zhang 2006] sec. 10.
     """
 
     def __init__(
@@ -74,7 +78,9 @@ class ConditionalMotion:
         Args:
             known: indices of points, none twice.
             displacements: (k, d) from the neutral face, head motion compensated.
-        Raises: InputError: no points, unknown or repeated ones, NaN.
+
+        Raises:
+            InputError: no points, unknown or repeated ones, NaN.
         """
         known, given = check_known(known, displacements, *self._mean.shape)
         rows = self._basis[:, known].reshape(len(self._basis), given.size)

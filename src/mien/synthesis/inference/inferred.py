@@ -21,11 +21,11 @@ class Inferred:
     """The displacements of all points.
 
     Attributes:
-        displacements: (n, d) from the neutral face, px in a picture, mm in space. The known
-            points, too, are where the statistics put them; who wants them where they were given
-            puts them back.
-        errors: (I,) after each iteration, the mean distance at the known points from what was
-            given for them.
+        displacements: (n, d) from the neutral face, px in a picture, mm in space. The known points,
+            too, are where the statistics put them; who wants them where they were given puts them
+            back.
+        errors: (I,) after each iteration, the mean distance at the known points from what was given
+            for them.
     """
 
     displacements: Float[Array, "n d"]
@@ -58,7 +58,8 @@ def check_known(
 ) -> tuple[Int[Array, " k"], Float[Array, "k d"]]:
     """Indices of some of `count` points, in rising order, and their displacements along `axes`.
 
-    Raises: InputError: none, one that is not there, one twice, shapes, NaN.
+    Raises:
+        InputError: none, one that is not there, one twice, shapes, NaN.
     """
     indices = np.asarray(known)
     if indices.ndim != 1 or indices.size == 0:

@@ -38,7 +38,9 @@ _TURN, _SHIFT = 0.1, 0.3
 def face_width(layout: FeatureLayout, points: Float[Array, "n 2"]) -> float:
     """Of a face whose points these are, px, told by those that no expression moves.
 
-    Raises: InputError: shape, NaN. EstimationError: all points in one place.
+    Raises:
+        InputError: shape, NaN.
+        EstimationError: all points in one place.
     """
     points = check_array("points", points, (len(layout.names), 2))
     rigid = layout.rigid
@@ -62,7 +64,9 @@ def look_mirrored(
         neutral: (n, 2) px of the face at rest.
         known: indices of points, none twice.
         positions: (k, 2) px of any picture.
-    Raises: InputError: shapes, NaN, unknown or repeated points, fewer than two.
+
+    Raises:
+        InputError: shapes, NaN, unknown or repeated points, fewer than two.
         EstimationError: all points in one place.
     """
     known, positions = check_known(known, positions, len(neutral))
@@ -84,7 +88,9 @@ def head_moved(
     Args:
         known: indices of points, none twice.
         positions: (k, 2) px of the neutral photo.
-    Raises: InputError: no points, unknown or repeated ones, shapes, NaN.
+
+    Raises:
+        InputError: no points, unknown or repeated ones, shapes, NaN.
     """
     neutral = examples.neutral.points
     known, positions = check_known(known, positions, len(neutral))
@@ -101,9 +107,14 @@ def oddness(examples: ExampleSet, points: Float[Array, "n 2"]) -> float | None:
 
     Args:
         points: (n, 2) px of any photo.
-    Returns: the root of the mean square; from `STRANGER` on, points are likelier another person's.
-        None where the statistics are too few to tell.
-    Raises: InputError: shape, NaN. EstimationError: all points in one place.
+
+    Returns:
+        the root of the mean square; from `STRANGER` on, points are likelier another person's. None
+        where the statistics are too few to tell.
+
+    Raises:
+        InputError: shape, NaN.
+        EstimationError: all points in one place.
     """
     if len(examples.statistics) < ENOUGH_STATISTICS:
         return None

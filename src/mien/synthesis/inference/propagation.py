@@ -1,4 +1,4 @@
-"""The motion of all feature points from that of a few, as Z06 prints it."""
+"""The motion of all feature points from that of a few, as [Zhang 2006] prints it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mien.synthesis.inference.inferred import LEAST_NOISE, Inferred, check_known
 __all__ = ["COMPONENTS", "PointSets", "Propagation", "visiting_order"]
 
 COMPONENTS = (20, 15, 15)
-"""Of the sets of each hierarchy. Z06 keeps 5 to 10 of 30 to 40 images; clips have more to tell."""
+"""Of the sets of each hierarchy. [Zhang 2006] keeps 5 to 10 of 30 to 40 images; clips have more."""
 
 PointSets = Sequence[Sequence[Int[Array, " s"]]]
 """For each hierarchy, from 0 on, its sets of indices of feature points."""
@@ -38,22 +38,26 @@ class Propagation:
 
     Args:
         layout: its point sets, by hierarchy.
-        statistics: (N, n, d) displacements from the neutral face of expressions of the same
-            person, head motion compensated, px in a picture and mm in space; N >= 2.
+        statistics: (N, n, d) displacements from the neutral face of expressions of the same person,
+            head motion compensated, px in a picture and mm in space; N >= 2.
         components: how many principal components the sets keep: one number, or one for each
             hierarchy.
         trust: what the known points of a set weigh together when it is projected, where all its
-            points at one each weigh 1, and none less than one; 0 is as printed. With more, what
-            was given lasts longer than what was guessed, and fewer iterations are needed.
+            points at one each weigh 1, and none less than one; 0 is as printed. With more, what was
+            given lasts longer than what was guessed, and fewer iterations are needed.
         prior: the weight of how usual a displacement is, with what the components leave as the
             noise; 0 is as printed, 1 the most likely displacement for normally distributed ones.
             With it, more components do good where they overfit without.
         threshold: px or mm; the propagation stops when an iteration changes what it makes of the
             known points by less than this, on the average of two.
         max_iterations: it stops after so many in any case.
-    Raises: InputError: shapes, NaN, too few statistics, sets of other points, options out of
-        their range.
-    Source: Z06 sec. 10 and 10.1. Left open there: components are about the mean; siblings are
+
+    Raises:
+        InputError: shapes, NaN, too few statistics, sets of other points, options out of their
+            range.
+
+    Source:
+        [Zhang 2006] sec. 10 and 10.1. Left open there: components are about the mean; siblings are
         visited in the order of the layout; progress is how far the points of T moved since the
         iteration before. `trust` and `prior` go beyond it.
     """
@@ -88,8 +92,12 @@ class Propagation:
         Args:
             known: indices of points, none twice.
             displacements: (k, d) from the neutral face, head motion compensated.
-        Raises: InputError: no points, unknown or repeated ones, NaN, none in any set.
-        Source: Z06 sec. 10.1, `MotionPropagation`.
+
+        Raises:
+            InputError: no points, unknown or repeated ones, NaN, none in any set.
+
+        Source:
+            [Zhang 2006] sec. 10.1, `MotionPropagation`.
         """
         known, given = check_known(known, displacements, *self._shape)
         projections = self._projections(known)
@@ -154,8 +162,11 @@ def visiting_order(sets: PointSets, known: Int[Array, " k"]) -> list[tuple[int, 
 
     It depends only on which sets share points, so once is enough for all iterations.
 
-    Raises: InputError: no set contains a known point.
-    Source: Z06 sec. 10.1, `MotionPropagationFeaturePointSet` with its flag hasBeenProcessed.
+    Raises:
+        InputError: no set contains a known point.
+
+    Source:
+        [Zhang 2006] sec. 10.1, `MotionPropagationFeaturePointSet` with its flag hasBeenProcessed.
     """
     places = [(level, index) for level, of in enumerate(sets) for index in range(len(of))]
     members = {place: set(sets[place[0]][place[1]].tolist()) for place in places}

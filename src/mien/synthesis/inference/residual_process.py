@@ -17,9 +17,13 @@ def closeness(places: Float[Array, "n 2"]) -> Float[Array, "n n"]:
 
     Args:
         places: (n, 2) in widths of the face.
-    Raises: InputError: shape, NaN.
-    Source: the covariance of Matern with smoothness 3/2: once differentiable, so that bends have
-        no edges, and well conditioned for points side by side.
+
+    Raises:
+        InputError: shape, NaN.
+
+    Source:
+        the covariance of Matern with smoothness 3/2: once differentiable, so that bends have no
+        edges, and well conditioned for points side by side.
     """
     places = check_array("places", places, (None, 2))
     apart = np.sqrt(3) * np.linalg.norm(places[:, None] - places, axis=2) / _REACH
@@ -40,7 +44,9 @@ def least_bend(
         bend: (q, q) covariance of a bend of size 1.
         given: (q,) less their mean, with more than `most` usual deviations.
         most: root of the mean square, in deviations.
-    Returns: the variance s of bends at which it is just `most`; (q,) (usual + s bend)^-1 given.
+
+    Returns:
+        the variance s of bends at which it is just `most`; (q,) (usual + s bend)^-1 given.
     """
     factor = np.linalg.cholesky(usual)
     inner = np.linalg.solve(factor, np.linalg.solve(factor, bend).T)

@@ -1,8 +1,11 @@
-"""Band-pass filtered pictures of a face: another camera's colours drop out (P02 sec. 6.2).
+"""Band-pass filtered pictures of a face: another camera's colours drop out.
 
 At one level of a pyramid, a picture less its own blur: what is finer than the level's pixels is
 gone already, what is coarser than the blur goes here. Only the face's own pixels are averaged, so
 that nothing of the background, or of a hand before the face, gets in.
+
+Source:
+    [Pighin 2002] sec. 6.2.
 """
 
 from __future__ import annotations
@@ -31,7 +34,8 @@ def band_pass(
 
     Args:
         mask: (h, w) 0 or 1; outside, the bands are 0, but for the target's: that goes on as far as
-            there are means. weights: (h, w) of pixels in the means.
+            there are means.
+        weights: (h, w) of pixels in the means.
         width: px, odd, side of the square whose mean goes.
     """
     import cv2

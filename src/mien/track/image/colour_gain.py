@@ -20,7 +20,8 @@ class Colours:
     """How a frame's colours come from the drawn ones: frame = gain * drawn + bias, 0 to 255.
 
     Attributes:
-        gain, bias: (3,).
+        gain: (3,).
+        bias: (3,).
     """
 
     gain: Float[Array, " 3"] = field(default_factory=lambda: np.ones(3))

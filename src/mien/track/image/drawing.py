@@ -1,4 +1,8 @@
-"""The face drawn for comparison: every expression's picture, pixel by pixel (P02 eq. 5)."""
+"""The face drawn for comparison: every expression's picture, pixel by pixel.
+
+Source:
+    [Pighin 2002] eq. 5.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +30,8 @@ class Pose:
     """Where the head is.
 
     Attributes:
-        R: (3, 3) R_cam_head. t: (3,) mm, t_cam_head.
+        R: (3, 3) R_cam_head.
+        t: (3,) mm, t_cam_head.
         zoom: the lens's focal length over that of the views.
     """
 
@@ -49,11 +54,12 @@ class Drawing(NamedTuple):
 
     Attributes:
         ids: (h, w) triangles, -1 where there is none that is compared.
-        barycentrics: (h, w, 3). depth: (h, w) mm.
+        barycentrics: (h, w, 3).
+        depth: (h, w) mm.
         places: (V, 3) mm, camera space.
         mask: (h, w) float32, 1 where there is a triangle that is compared.
         layers: (h, w, K) float32, 0 to 255: luma of each expression's rendering, on one geometry.
-        luma: (h, w) float32: of their mixture, P02 eq. (5).
+        luma: (h, w) float32: of their mixture, [Pighin 2002] eq. (5).
     """
 
     ids: Int[Array, "h w"]
@@ -115,7 +121,9 @@ class _Surface(NamedTuple):
     """What triangles look like.
 
     Attributes:
-        compared: (F,) bool. triangles: (F, 3). uvs: (F, 3, 2) of every triangle's corners.
+        compared: (F,) bool.
+        triangles: (F, 3).
+        uvs: (F, 3, 2) of every triangle's corners.
         shades: (V, 2 + K) float32 level of detail, brightness, weight of every texture.
     """
 
@@ -131,7 +139,9 @@ class _Placed:
 
     Attributes:
         surface: of its triangles.
-        places: (V, 3) mm, camera space. points: (V, 2) px. depth: (V,) mm.
+        places: (V, 3) mm, camera space.
+        points: (V, 2) px.
+        depth: (V,) mm.
         raster: what covers the pixels, where `cover` has been.
     """
 
@@ -186,7 +196,8 @@ def _place_vertices(
     """Fill in vertices in camera space, where they are seen, and shades but for their detail.
 
     Args:
-        motion: (3, 4) from head to camera space. lens: focal length and principal point, px.
+        motion: (3, 4) from head to camera space.
+        lens: focal length and principal point, px.
     """
     focal, cx, cy = lens
     for v in range(len(vertices)):

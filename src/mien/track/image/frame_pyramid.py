@@ -23,7 +23,9 @@ class View:
     Attributes:
         pixels: (h, w, 3) float32, 0 to 255.
         inside: (h, w) float32, 1 where the frame has a pixel that tells how bright the face is.
-        focal, cx, cy: px of this size; the principal point from the cut-out's corner.
+        focal: px of this size; the principal point from the cut-out's corner.
+        cx: px of this size; the principal point from the cut-out's corner.
+        cy: px of this size; the principal point from the cut-out's corner.
     """
 
     pixels: Float[Array, "h w 3"]
@@ -51,8 +53,8 @@ def cut_views(
     Args:
         camera: of the frame's own pixels.
         points: (N, 2) px where the face is thought to be.
-        face_px: extent at which a face is compared, give or take a factor of sqrt(2); a smaller
-            one stays as it is.
+        face_px: extent at which a face is compared, give or take a factor of sqrt(2); a smaller one
+            stays as it is.
         levels: how many sizes.
     """
     low, high = points.min(axis=0), points.max(axis=0)

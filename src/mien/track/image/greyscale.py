@@ -22,9 +22,11 @@ class GreyPyramids(NamedTuple):
     """What Pyramids are, in grey.
 
     Attributes:
-        texels: (N, K) uint16 luma of K textures, in steps of 1 / STEPS of a grey level; level
-            after level, row after row.
-        widths, heights, starts: (L,) each level's size and its first texel.
+        texels: (N, K) uint16 luma of K textures, in steps of 1 / STEPS of a grey level; level after
+            level, row after row.
+        widths: (L,) each level's size and its first texel.
+        heights: (L,) each level's size and its first texel.
+        starts: (L,) each level's size and its first texel.
         dropped: how many finer levels the textures have.
     """
 

@@ -85,7 +85,8 @@ class Pictures:
     """Shows pictures of one head to a detector.
 
     Args:
-        rig: poses the head. mesh: the head's own, in its neutral face.
+        rig: poses the head.
+        mesh: the head's own, in its neutral face.
     """
 
     def __init__(self, rig: Rig, mesh: Mesh, detector: LandmarkDetector) -> None:
@@ -139,7 +140,9 @@ def places_meant(
     Each is held lightly where it is attached, for what the pictures do not tell.
 
     Args:
-        attached: (478, 3) mm. normals: (478, 3) there. sights: none or some of one face.
+        attached: (478, 3) mm.
+        normals: (478, 3) there.
+        sights: none or some of one face.
         drift: with the viewpoint, where it is known; found from the pictures otherwise.
     """
     seen_from = [viewpoint(sight.camera.R_cam_head, sight.camera.t_cam_head) for sight in sights]

@@ -45,7 +45,9 @@ class Guess:
     """Where a head is and what its face does.
 
     Attributes:
-        R: (3, 3) R_cam_head. t: (3,) mm, t_cam_head. face: (P,) the unknowns of Marks.
+        R: (3, 3) R_cam_head.
+        t: (3,) mm, t_cam_head.
+        face: (P,) the unknowns of Marks.
     """
 
     R: Float[Array, "3 3"]
@@ -64,11 +66,15 @@ class Observation:
     """The N landmarks of one picture that can be trusted, and the detector's scores.
 
     Attributes:
-        places: (N, 3) mm on the neutral face. drift: (N, 3, 3) mm, last axis the viewpoint's.
+        places: (N, 3) mm on the neutral face.
+        drift: (N, 3, 3) mm, last axis the viewpoint's.
         moves: (N, 3, P) mm, of the face's unknowns.
-        image_points: (N, 2) px less the principal point. sigma_mm: (N,) each axis.
-        scores: (S,) more than in the neutral face. score_moves: (P, S).
-        R_cam_head: (3, 3) as the detector has it. kept: (N,) which of the 478 landmarks.
+        image_points: (N, 2) px less the principal point.
+        sigma_mm: (N,) each axis.
+        scores: (S,) more than in the neutral face.
+        score_moves: (P, S).
+        R_cam_head: (3, 3) as the detector has it.
+        kept: (N,) which of the 478 landmarks.
     """
 
     places: Float[Array, "n 3"]
@@ -137,8 +143,10 @@ class Measured:
     """How N landmarks lie off, with derivatives.
 
     Attributes:
-        by_camera: (N, 2, 7) by the UNKNOWNS of a camera. by_place: (N, 2, 3) px / mm.
-        residuals: (N, 2) px. weights: (N,) 1 / px^2.
+        by_camera: (N, 2, 7) by the UNKNOWNS of a camera.
+        by_place: (N, 2, 3) px / mm.
+        residuals: (N, 2) px.
+        weights: (N,) 1 / px^2.
     """
 
     by_camera: Float[Array, "n 2 7"]
@@ -207,7 +215,8 @@ class MarkProblem:
     def normal_equations(self, guess: Guess) -> tuple[Array, Array]:
         """(7 + P, 7 + P) and (7 + P,): Hessian and gradient over pose, log focal and face.
 
-        Raises: EstimationError: a landmark lies behind the camera.
+        Raises:
+            EstimationError: a landmark lies behind the camera.
         """
         hessian, gradient = self.measured(guess).normal_equations(self._seen.moves)
         self.add_belief(guess.face, hessian[UNKNOWNS:, UNKNOWNS:], gradient[UNKNOWNS:])
@@ -239,7 +248,8 @@ def _likely(layout: Layout, count: int) -> Float[Array, "p p"]:
 def fit_face(seen: Observation, layout: Layout, focal_px: float, *, start: Guess) -> Guess:
     """Head and face of highest posterior; weights from 0 to 1.2.
 
-    Raises: EstimationError: a landmark comes to lie behind the camera.
+    Raises:
+        EstimationError: a landmark comes to lie behind the camera.
     """
     problem = MarkProblem(seen, layout, focal_px, near=start)
     known = np.arange(UNKNOWNS + len(start.face)) != _POSE  # The focal length.
@@ -274,6 +284,7 @@ def bounded_step(
     high: Float[Array, " q"],
 ) -> Float[Array, " q"]:
     """The step to the lowest place of a quadratic between bounds, nearly: what meets its bound
+
     on the way stays there. Bounds include 0.
     """
     step = np.zeros_like(gradient)

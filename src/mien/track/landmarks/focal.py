@@ -45,8 +45,10 @@ class FocalEstimate:
     """A video's focal length.
 
     Attributes:
-        focal_px: of its upright pictures. deviation: of its logarithm; 0.1 is about 10 %.
-        frames_used: how many frames it rests on. note: one line for the user.
+        focal_px: of its upright pictures.
+        deviation: of its logarithm; 0.1 is about 10 %.
+        frames_used: how many frames it rests on.
+        note: one line for the user.
     """
 
     focal_px: float
@@ -63,7 +65,8 @@ class FocalEstimator:
     says little, however long it does.
 
     Args:
-        starter: of the head. size: width and height of the video's upright pictures.
+        starter: of the head.
+        size: width and height of the video's upright pictures.
         expected: what is known before; see lens.expected_focal.
     """
 
@@ -114,7 +117,8 @@ class FocalEstimator:
     def estimate(self) -> LogFocal:
         """The focal length of highest posterior, and how well it is known.
 
-        Raises: EstimationError: a landmark comes to lie behind the camera.
+        Raises:
+            EstimationError: a landmark comes to lie behind the camera.
         """
         if not self._seen:
             return self._expected
@@ -226,7 +230,9 @@ def estimate_focal(
         frames: upright pictures of one size, at most as many as are worth 10 ms each.
         expected: what is known before; by default lens.expected_focal.
         is_own: whether a face found in a picture is the head's.
-    Raises: InputError: no frames.
+
+    Raises:
+        InputError: no frames.
     """
     estimator, size = None, None
     for number, pixels in enumerate(frames):

@@ -48,11 +48,14 @@ class Starter:
     """Finds one head in pictures of any size; what they share is prepared once, in a second.
 
     Attributes:
-        marks: the landmarks of this head. layout: of what is found.
+        marks: the landmarks of this head.
+        layout: of what is found.
 
     Args:
         rig: of the head, if there is one already.
-    Raises: InputError: as Rig; a layout that is not the head's.
+
+    Raises:
+        InputError: as Rig; a layout that is not the head's.
     """
 
     def __init__(

@@ -63,8 +63,12 @@ def measure_marks(rig: Rig, mesh: Mesh, layout: Layout, pictures: Pictures) -> M
     Where it finds no face in them, landmarks stay where the generic head has them.
 
     Args:
-        rig: poses the head. mesh: the head's own, in its neutral face. pictures: of it.
-    Raises: InputError: a region, expression or unit that the head has not.
+        rig: poses the head.
+        mesh: the head's own, in its neutral face.
+        pictures: of it.
+
+    Raises:
+        InputError: a region, expression or unit that the head has not.
     """
     generic = load_generic_head()
     neutral = pictures.meant(FaceState())

@@ -1,4 +1,8 @@
-"""One frame: pose and face from coarse to fine (P02 sec. 6.1.2), and how well they fit."""
+"""One frame: pose and face from coarse to fine, and how well they fit.
+
+Source:
+    [Pighin 2002] sec. 6.1.2.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +38,8 @@ class FitOptions:
     Attributes:
         face_px: extent at which the face is compared; smaller ones stay as they are.
         levels: sizes of the picture, each half of the one before; 2 at least.
-        iterations: at most, each time that the face is drawn. last: the same for the last time.
+        iterations: at most, each time that the face is drawn.
+        last: the same for the last time.
         numeric: unknowns whose Jacobian is taken by central differences: "pose", a region, a unit,
             "gaze". All are analytic by default: as good, and a tenth of the time
             (docs/tracking.md).
@@ -54,7 +59,8 @@ class Fitted:
     """What a frame shows.
 
     Attributes:
-        guess: of least cost. deviations: (N,) of its unknowns.
+        guess: of least cost.
+        deviations: (N,) of its unknowns.
         information: (N - 1, N - 1) inverse covariance of all but the focal length.
         colours: of the frame over the drawn ones.
         agreement: of the frame and the drawn face.
@@ -71,7 +77,8 @@ class FrameFit:
     """Fits one head to frames.
 
     Attributes:
-        model: the head. options: how.
+        model: the head.
+        options: how.
     """
 
     def __init__(self, model: TrackedFace, options: FitOptions) -> None:
@@ -101,8 +108,11 @@ class FrameFit:
 
         Args:
             camera: of the frame, its lens; the pose in it does not matter.
-            belief: what is expected. colours: of the frame before, if there is one.
-        Returns: None where the start shows no face in the frame.
+            belief: what is expected.
+            colours: of the frame before, if there is one.
+
+        Returns:
+            None where the start shows no face in the frame.
         """
         anchor = self.model.anchored(start.face)
         cut = self._views(pixels, camera, start.pose, anchor)

@@ -1,4 +1,4 @@
-"""Where each unknown moves the points of a head in the picture (P02 app. B)."""
+"""Where each unknown moves the points of a head in the picture ([Pighin 2002] app. B)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mien.track.image.drawing import Lens, Pose, lens_of
 from mien.track.image.frame_pyramid import View
 
 POSE_UNKNOWNS = 7
-"""Rotation vector (applied from the left, P02 app. B.2), translation mm, log focal length."""
+"""Rotation vector ([Pighin 2002] app. B.2; from the left), translation mm, log focal length."""
 
 
 class Flows(NamedTuple):
@@ -20,8 +20,9 @@ class Flows(NamedTuple):
 
     Attributes:
         face: (V, N - 7, 2) float32 px, of every vertex, by the face's unknowns.
-        t: (3,) mm of the pose. lens: focal length and principal point, px. With these, pose_flow
-            is quicker than a look at three vertices.
+        t: (3,) mm of the pose.
+        lens: focal length and principal point, px. With these, pose_flow is quicker than a look at
+            three vertices.
         counted: (N,) float32: 1, or 0 where an unknown's motion is not to count.
     """
 
@@ -36,7 +37,8 @@ def screen_flows(
 ) -> Flows:
     """Flows of the pose's seven unknowns and P of the face's.
 
-    Source: P02 app. B.1, B.2.
+    Source:
+        [Pighin 2002] app. B.1, B.2.
     """
     face = np.empty((len(places), len(moves), 2), np.float32)
     lens = lens_of(view, pose)
@@ -85,7 +87,9 @@ def pose_flow(
     """Px by which each of the pose's unknowns moves a point: f/z (dX - x dZ, dY - y dZ).
 
     Args:
-        x, y: X/z and Y/z of the point, camera space. z: its depth.
+        x: X/z and Y/z of the point, camera space.
+        y: X/z and Y/z of the point, camera space.
+        z: its depth.
     """
     scale = focal / z
     # R m, about which the head turns: the place less the translation.

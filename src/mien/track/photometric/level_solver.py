@@ -1,4 +1,8 @@
-"""Pose, then expression, by Levenberg-Marquardt on one size of a picture (P02 sec. 6.1.2)."""
+"""Pose, then expression, by Levenberg-Marquardt on one size of a picture.
+
+Source:
+    [Pighin 2002] sec. 6.1.2.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +25,7 @@ from mien.track.photometric.range_penalty import range_penalty
 SAY = 2000.0
 """How many independent observations a face's pixels are, however many: neighbours err alike."""
 LIMIT = 200.0
-"""c of P02's D(p), in units of the cost: a weight that is 0.1 out of range costs 2."""
+"""c of [Pighin 2002]'s D(p), in units of the cost: a weight that is 0.1 out of range costs 2."""
 _LEAST_NOISE = 0.5
 """Grey levels: nothing is believed to be drawn better than this."""
 
@@ -31,9 +35,11 @@ class Answer:
     """What a phase found.
 
     Attributes:
-        guess: of least cost. look: at the scene, around the start.
+        guess: of least cost.
+        look: at the scene, around the start.
         matrix: (N, N) of the pixels' normal equations, in units of the cost.
-        belief: as it was given. free: (N,) which unknowns were solved for.
+        belief: as it was given.
+        free: (N,) which unknowns were solved for.
         iterations: linearizations made.
         rms: grey levels, of the pixels' weighted residual.
     """
@@ -70,7 +76,7 @@ class Answer:
 def solve(
     look: Look, belief: Belief, *, free: Bool[Array, " n"], iterations: int, tolerance: float
 ) -> Answer:
-    """The free unknowns of least cost, by P02 eq. (6); damping is in proportion to the diagonal.
+    """The free unknowns of least cost, by [Pighin 2002] eq. (6); damped by the diagonal.
 
     The cost is the squared residual of the pixels, in units of the noise that the first guess
     leaves and counted as SAY observations in all, plus half the squared distance from the belief,
@@ -78,7 +84,8 @@ def solve(
 
     Args:
         look: gives the pixels' equations, and the first guess.
-        iterations, tolerance: where to stop (numeric.solvers.levenberg_marquardt).
+        iterations: where to stop (numeric.solvers.levenberg_marquardt).
+        tolerance: where to stop (numeric.solvers.levenberg_marquardt).
     """
     problem = _Problem(look, belief, free)
     result = minimize_lm(
@@ -145,7 +152,9 @@ class _Prior(NamedTuple):
     """Belief and D(p) at a guess.
 
     Attributes:
-        value: >= 0. gradient: (N,). hessian: (N, N).
+        value: >= 0.
+        gradient: (N,).
+        hessian: (N, N).
     """
 
     value: float

@@ -29,8 +29,10 @@ class Pictures(NamedTuple):
     """Plain luma of face and frame, where a drawing shows the face.
 
     Attributes:
-        ids: (h, w) triangles, -1 for none. mask: (h, w) float32, 1 where there is one.
-        drawn, target: (h, w) float32, 0 to 255.
+        ids: (h, w) triangles, -1 for none.
+        mask: (h, w) float32, 1 where there is one.
+        drawn: (h, w) float32, 0 to 255.
+        target: (h, w) float32, 0 to 255.
     """
 
     ids: Int[Array, "h w"]

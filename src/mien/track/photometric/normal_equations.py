@@ -1,10 +1,10 @@
 """Normal equations of the residual, summed up pixel by pixel: J itself is never stored.
 
-The residual is eps(p) = 1/2 sum w rho(I_t - I^) of P02 sec. 6.1.2, with a weight for each
-pixel and a robust rho where P02 has the square; J = G + B of eq. (7), G by Sobel's gradient of the
-pictures and the chain rule through projection, rotation and shape (app. B), B by those of single
-expressions. What eq. (7) leaves to the reader: at a pixel that stays, a picture that moves to the
-right brings what was to its left, so G takes the gradient with a minus.
+The residual is eps(p) = 1/2 sum w rho(I_t - I^) of [Pighin 2002] sec. 6.1.2, with a weight for each
+pixel and a robust rho where [Pighin 2002] has the square; J = G + B of eq. (7), G by Sobel's
+gradient of the pictures and the chain rule through projection, rotation and shape (app. B), B by
+those of single expressions. What eq. (7) leaves to the reader: at a pixel that stays, a picture
+that moves to the right brings what was to its left, so G takes the gradient with a minus.
 """
 
 from __future__ import annotations
@@ -51,8 +51,10 @@ class Equations:
     """J^T W J, J^T W r, and what the residual is.
 
     Attributes:
-        matrix: (N, N). vector: (N,), so that matrix @ step = vector lowers the residual.
-        squares: sum of w rho(r) over the pixels. weight: sum of w.
+        matrix: (N, N).
+        vector: (N,), so that matrix @ step = vector lowers the residual.
+        squares: sum of w rho(r) over the pixels.
+        weight: sum of w.
     """
 
     matrix: Float[Array, "n n"]
@@ -76,7 +78,9 @@ def sum_up(
         answers: which unknowns concern which samples.
         matrix: where the samples were drawn, for the first step; False: leave J^T W J at 0, it is
             next to the same near by.
-    Source: that a Hessian may be kept, Baker and Matthews, Lucas-Kanade 20 years on, 2004.
+
+    Source:
+        that a Hessian may be kept, Baker and Matthews, Lucas-Kanade 20 years on, 2004.
     """
     sets, most = answers.sets.shape
     side = most if matrix else 0

@@ -1,4 +1,4 @@
-"""P02's other way of computing the Jacobian: central differences of the drawn picture.
+"""[Pighin 2002]'s other way of computing the Jacobian: central differences of the drawn picture.
 
 Nothing that is drawn is left out: what hides what, what a filter makes of a moving outline, and, if
 asked for, contacts and shadows. It takes two more drawings for every unknown, where the analytic
@@ -44,8 +44,11 @@ def by_differences(
         exact: draw the rig's own face every time, contacts and shadows too, not the face that is
             linear around the scene's anchor.
         step_px: how far a step moves the fastest part of the face.
-    Source: P02 sec. 6.1.3, but that the residual is differentiated, not the drawn picture alone:
-        the filter takes its means over the face, and with the face the target's mean moves too.
+
+    Source:
+        [Pighin 2002] sec. 6.1.3, but that the residual is differentiated, not the drawn picture
+        alone: the filter takes its means over the face, and with the face the target's mean moves
+        too.
     """
 
     def linearized(scene: Scene, guess: Guess) -> Look:
@@ -107,7 +110,8 @@ class _Redrawn:
 def unknowns_named(layout: Layout, names: Sequence[str]) -> Bool[Array, " n"]:
     """Which unknowns these names stand for: `pose`, a region, a unit, `gaze`.
 
-    Raises: InputError: another name.
+    Raises:
+        InputError: another name.
     """
     directions = len(layout.expressions) - 1
     counts = {"pose": POSE_UNKNOWNS} | dict.fromkeys(layout.regions, directions)

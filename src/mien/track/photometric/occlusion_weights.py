@@ -36,6 +36,7 @@ def patch_trust(
     face_px: float,
 ) -> Float[Array, "h w"]:
     """(h, w) float32 from 0 to 1: low where the two differ too much, by Geman and McClure's
+
     weights of differences averaged over patches; 1 where the weights are 0.
     """
     import cv2

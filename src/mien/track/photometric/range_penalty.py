@@ -1,4 +1,4 @@
-"""What keeps weights in range: D(p) of P02 sec. 6.1.2, with its gradient and Hessian."""
+"""What keeps weights in range: D(p) of [Pighin 2002] sec. 6.1.2, with its gradient and Hessian."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ class Limits(NamedTuple):
     """What of a face is to lie from 0 to 1: directions @ parameters + offset.
 
     Attributes:
-        directions: (M, P). offset: (M,).
+        directions: (M, P).
+        offset: (M,).
     """
 
     directions: Float[Array, "m p"]
@@ -38,7 +39,9 @@ class Penalty(NamedTuple):
     """D by parameters of which weights are linear functions, w = directions a + w*.
 
     Attributes:
-        value: >= 0. gradient: (N,). hessian: (N, N).
+        value: >= 0.
+        gradient: (N,).
+        hessian: (N, N).
     """
 
     value: float

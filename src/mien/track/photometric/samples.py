@@ -20,12 +20,14 @@ class Answers(NamedTuple):
     """Which of the N unknowns, the pose's seven and then the face's, concern which pixels.
 
     Attributes:
-        sets, sizes: (S, A) unknowns that concern the same triangles, in the first `sizes` (S,) of
-            a row; the pose's come first.
+        sets: (S, A) unknowns that concern the same triangles, in the first `sizes` (S,) of a row;
+            the pose's come first.
+        sizes: as `sets`.
         set_of: (F,) which row is each triangle's.
         region: (N,) in which region the mixture of textures changes with it; -1 for none.
         direction: (N,) along which column of Q it does.
-        Q: (K, L) float32, P02 eq. (4). masks: (V, R) float32 of the regions.
+        Q: (K, L) float32, [Pighin 2002] eq. (4).
+        masks: (V, R) float32 of the regions.
         triangles: (F, 3) vertex indices.
     """
 
@@ -44,14 +46,19 @@ class Samples(NamedTuple):
 
     Attributes:
         starts: (S + 1,) each set's first.
-        corners: (N, 3) vertices of its triangle. barycentrics: (N, 3) float32.
-        x, y, z: (N,) float32 X/Z, Y/Z and Z mm, camera space, where it was drawn.
-        drawn: (N,) float32 luma, plain or filtered. weights: (N,) float32.
+        corners: (N, 3) vertices of its triangle.
+        barycentrics: (N, 3) float32.
+        x: (N,) float32 X/Z, Y/Z and Z mm, camera space, where it was drawn.
+        y: (N,) float32 X/Z, Y/Z and Z mm, camera space, where it was drawn.
+        z: (N,) float32 X/Z, Y/Z and Z mm, camera space, where it was drawn.
+        drawn: (N,) float32 luma, plain or filtered.
+        weights: (N,) float32.
         slopes: (2, N) float32: how drawn changes at a pixel where it moves by a px to the right,
-            and down. first: the mean of drawn's and the target's, for the step from where samples
-            were drawn.
+            and down.
+        first: the mean of drawn's and the target's, for the step from where samples were drawn.
         along: (L, N) float32: how drawn changes with each direction of the mixture, were it
-            everywhere; shares: (R, N) float32 of the regions in the pixel.
+            everywhere.
+        shares: (R, N) float32 of the regions in the pixel.
         target: (h, w) float32 luma of the frame, plain or filtered alike.
         scale: grey levels. Geman and McClure's: a pixel that is off by it counts a quarter.
     """
@@ -86,8 +93,11 @@ def take_samples(
     """Samples of a drawing.
 
     Args:
-        layers: the expressions' pictures, plain or filtered; drawn, target: luma, likewise.
-        weights: of the pixels. lens: of the drawing.
+        layers: the expressions' pictures, plain or filtered.
+        drawn: luma, likewise.
+        target: luma, likewise.
+        weights: of the pixels.
+        lens: of the drawing.
         scale: of Samples.
     """
     height, width = drawing.ids.shape
@@ -239,7 +249,9 @@ def look_up(picture: Array, width: int, height: int, x: float, y: float) -> np.f
     Between pixels a straight line would blur, the more the farther from both.
 
     Args:
-        picture: (H * W,) float32, row after row. x, y: px, the first one's centre at 0, 0.
+        picture: (H * W,) float32, row after row.
+        x: px, the first one's centre at 0, 0.
+        y: px, the first one's centre at 0, 0.
     """
     x, y = min(max(x, 1.0), width - 2.001), min(max(y, 1.0), height - 2.001)
     col, row = int(x), int(y)
