@@ -73,5 +73,4 @@ def _covariance(scene: Scene, sigma_px: float) -> Array:
     )
     system = linearize_bundle(truth, data)
     held = similarity_constraints(truth.points, ~system.open_blocks())
-    covariance: Array = system.covariance(held)[0]
-    return covariance
+    return system.covariance(held)[0]

@@ -65,8 +65,7 @@ class FilmedFace:
         """How far the lips are apart, in widths of the face."""
         upper, lower = (self.layout.index(f"{lip}_lip_inner") for lip in ("upper", "lower"))
         apart = np.linalg.norm(self.points[:, upper] - self.points[:, lower], axis=1)
-        gaps: Array = apart / np.ptp(self.points[..., 0], axis=1)
-        return gaps
+        return apart / np.ptp(self.points[..., 0], axis=1)
 
 
 def filmed(clip: Path, layout: FeatureLayout, detector: LandmarkDetector) -> FilmedFace:

@@ -164,5 +164,4 @@ def _on_triangle(p: Array, corners: Array, out: Array) -> float:
 
 @njit(cache=True, nogil=True)
 def _dot(a: Array, b: Array) -> float:
-    dot: float = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    return dot
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -29,8 +29,7 @@ class Hits:
 
     def of(self, corners: Int[Array, "f 3"], values: Float[Array, "v c"]) -> Float[Array, "n c"]:
         """Values at the corners of the triangles, interpolated: (N, C)."""
-        mixed: Array = np.einsum("nc,ncd->nd", self.barycentrics, values[corners[self.triangles]])
-        return mixed
+        return np.einsum("nc,ncd->nd", self.barycentrics, values[corners[self.triangles]])
 
 
 class Paint(Protocol):
@@ -108,5 +107,4 @@ class ProjectedPaint:
         for projector in self.projectors:
             colour, weight = projector(points)
             colours, total = colours + weight * colour, total + weight
-        blended: Array = colours / total
-        return blended
+        return colours / total

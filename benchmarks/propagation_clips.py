@@ -76,8 +76,7 @@ class HeldOut:
 
     def _seen_by(self, known: Array, displacements: Array) -> Array:
         geometries, _ = compensated(displacements + self.neutral, self.neutral, by=known)
-        seen: Array = geometries - self.neutral
-        return seen
+        return geometries - self.neutral
 
 
 def held_out(clip: Path, layout: FeatureLayout, detector: LandmarkDetector) -> HeldOut:
@@ -116,5 +115,4 @@ def most_different(displacements: Float[Array, "m n 2"], count: int) -> Int[Arra
 def _most_usual(points: Float[Array, "m n 2"]) -> Float[Array, "n 2"]:
     geometries, _ = compensated(points, points[0])
     away = np.linalg.norm(geometries - np.median(geometries, axis=0), axis=-1).sum(axis=-1)
-    usual: Array = points[away.argmin()]
-    return usual
+    return points[away.argmin()]

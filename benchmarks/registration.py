@@ -155,8 +155,7 @@ def _true_vertices(folder: Path) -> Float[Array, "v 3"] | None:
     if not path.is_file():
         return None
     with np.load(path, allow_pickle=False) as stored:
-        vertices: Array = stored["vertices"]
-        return vertices
+        return stored["vertices"]
 
 
 SURFACE_HEADER = (

@@ -76,8 +76,7 @@ def render_exactly(
         _render_band(subject, camera, first, min(first + _BAND, camera.height), finer, background)
         for first in range(0, camera.height, _BAND)
     ]
-    image: Array = np.clip(np.rint(np.concatenate(bands)), 0, 255).astype(np.uint8)
-    return image
+    return np.clip(np.rint(np.concatenate(bands)), 0, 255).astype(np.uint8)
 
 
 def _render_band(
@@ -104,8 +103,7 @@ def _render_band(
     colours[:] = background
     hits = Hits(raster.triangle_ids[seen], raster.barycentrics[seen].astype(np.float64))
     colours[seen] = subject.paint(subject.mesh, hits)
-    pixels: Array = cv2.resize(colours, (camera.width, end - first), interpolation=cv2.INTER_AREA)
-    return pixels
+    return cv2.resize(colours, (camera.width, end - first), interpolation=cv2.INTER_AREA)
 
 
 @dataclass(frozen=True)

@@ -93,8 +93,7 @@ class Samples:
 
     def on(self, vertices: Float[Array, "v 3"]) -> Float[Array, "n 3"]:
         """(N, 3) where the samples lie on a head with these vertices."""
-        places: Array = np.einsum("nc,ncd->nd", self.barycentrics, vertices[self.triangles])
-        return places
+        return np.einsum("nc,ncd->nd", self.barycentrics, vertices[self.triangles])
 
 
 def load_scan(folder: Path) -> Scan:
@@ -213,8 +212,7 @@ def similarity(source: Float[Array, "n 3"], target: Float[Array, "n 3"]) -> Floa
 
 def move(T: Float[Array, "4 4"], points: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
     """Points under a 4x4 transform."""
-    moved: Array = points @ T[:3, :3].T + T[:3, 3]
-    return moved
+    return points @ T[:3, :3].T + T[:3, 3]
 
 
 def distance_to(
@@ -263,5 +261,4 @@ def _straightened(camera: Camera) -> Float[Array, "3 3"]:
     forward = np.array([x, y, 1.0]) / np.linalg.norm([x, y, 1.0])
     right = np.cross([0.0, 1.0, 0.0], forward)
     right /= np.linalg.norm(right)
-    turned: Array = np.stack([right, np.cross(forward, right), forward]) @ camera.R_cam_head
-    return turned
+    return np.stack([right, np.cross(forward, right), forward]) @ camera.R_cam_head

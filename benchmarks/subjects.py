@@ -184,8 +184,7 @@ def smooth_field(
     frequencies = rng.normal(size=(waves, 3)) / length_mm
     phases = rng.uniform(0, 2 * np.pi, waves)
     amplitudes = rng.normal(size=(waves, 3)) * rms_mm * np.sqrt(2 / (3 * waves))
-    field: Array = np.cos(points @ frequencies.T + phases) @ amplitudes
-    return field
+    return np.cos(points @ frequencies.T + phases) @ amplitudes
 
 
 def _deformed(
@@ -213,5 +212,4 @@ def _shading(mesh: Mesh) -> Float[Array, " v"]:
     """(V,) between 0.55 and 1.1: Lambert's law under a light from above and the subject's left."""
     light = np.array([0.5, 0.55, 0.8])
     facing = mesh.vertex_normals() @ (light / np.linalg.norm(light))
-    shading: Array = 0.55 + 0.55 * np.maximum(facing, 0)
-    return shading
+    return 0.55 + 0.55 * np.maximum(facing, 0)

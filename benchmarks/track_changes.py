@@ -140,8 +140,7 @@ def _hand(size: int, centre: Float[Array, " 2"], scale: float) -> Bool[Array, "h
         along = np.array([np.sin(angle), -np.cos(angle)])
         ends = (centre + 0.6 * scale * along, centre + 1.9 * scale * along)
         cv2.line(image, _pixel(ends[0]), _pixel(ends[1]), 255, max(1, round(0.32 * scale)))
-    inside: Array = image > 0
-    return inside
+    return image > 0
 
 
 def _pixel(point: Float[Array, " 2"]) -> tuple[int, int]:

@@ -112,8 +112,7 @@ def known_weights(frames: int = FRAMES) -> Float[Array, "n 3"]:
     after = np.clip(np.searchsorted(times, now, side="right"), 1, len(times) - 1)
     share = (now - times[after - 1]) / (times[after] - times[after - 1])
     eased = (share**2 * (3 - 2 * share))[:, None]
-    weights: Array = (1 - eased) * rows[after - 1] + eased * rows[after]
-    return weights
+    return (1 - eased) * rows[after - 1] + eased * rows[after]
 
 
 def perform(
@@ -256,8 +255,7 @@ def _shaded(
     field = interpolate(flat, mesh.triangles, factor[:, None])[..., 0]
     # Soft, and 1 outside of the charts, so that no seam shows.
     field = cv2.GaussianBlur(np.where(flat.mask, field, 1.0), (0, 0), size / 256)
-    shaded: Array = np.clip(np.rint(atlas * field[..., None]), 0, 255).astype(np.uint8)
-    return shaded
+    return np.clip(np.rint(atlas * field[..., None]), 0, 255).astype(np.uint8)
 
 
 def cluttered(size: int, rng: np.random.Generator) -> UInt8[Array, "h w 3"]:
@@ -276,5 +274,4 @@ def cluttered(size: int, rng: np.random.Generator) -> UInt8[Array, "h w 3"]:
             cv2.rectangle(image, first, last, colour, -1, cv2.LINE_AA)
         else:
             cv2.circle(image, first, int(extent[0]) // 2, colour, -1, cv2.LINE_AA)
-    quantized: Array = np.clip(np.rint(image), 0, 255).astype(np.uint8)
-    return quantized
+    return np.clip(np.rint(image), 0, 255).astype(np.uint8)

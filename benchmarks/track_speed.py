@@ -111,8 +111,7 @@ def _fitted(pixels: UInt8[Array, "h w 3"], size: tuple[int, int]) -> UInt8[Array
     width, height = size
     inside = cv2.resize(pixels, (height, height), interpolation=cv2.INTER_AREA)
     if width == height:
-        scaled: Array = inside
-        return scaled
+        return inside
     picture: Array = cv2.resize(cv2.resize(pixels, (16, 9)), size, interpolation=cv2.INTER_CUBIC)
     left = (width - height) // 2
     picture[:, left : left + height] = inside

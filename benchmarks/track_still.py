@@ -129,8 +129,7 @@ def jitter(
 
 
 def _second(values: Float[Array, "n c"], middle: Array) -> Float[Array, "m c"]:
-    difference: Array = values[middle + 1] - 2 * values[middle] + values[middle - 1]
-    return difference
+    return values[middle + 1] - 2 * values[middle] + values[middle - 1]
 
 
 def _rms(vectors: Float[Array, "n c"]) -> float:

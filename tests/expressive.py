@@ -36,8 +36,7 @@ def weights_of(**units: float) -> Array:
 
 def making(weights: Array) -> Array:
     """(V, 3) mm: the person making a face of these units."""
-    moved: Array = NEUTRAL + np.tensordot(weights, GENERIC.unit_offsets, axes=1)
-    return moved
+    return NEUTRAL + np.tensordot(weights, GENERIC.unit_offsets, axes=1)
 
 
 def looking(vertices: Array, yaw: float, pitch: float) -> Array:
@@ -54,8 +53,7 @@ def looking(vertices: Array, yaw: float, pitch: float) -> Array:
 def bump(middle: Array, *, width_mm: float, along: Sequence[float]) -> Array:
     """(V, 3) mm: a smooth movement of the skin around a place of the generic head."""
     away = np.linalg.norm(GENERIC.mesh.vertices - middle, axis=1)
-    moved: Array = np.exp(-((away / width_mm) ** 2))[:, None] * np.array(along)
-    return moved
+    return np.exp(-((away / width_mm) ** 2))[:, None] * np.array(along)
 
 
 def exactly_detected(
@@ -149,5 +147,4 @@ def off_px(found: Array, true: Array, camera: Camera, true_camera: Camera | None
     depth = seen_from.to_camera(true[FACE])
     facing = GENERIC.mesh.with_vertices(true).vertex_normals()[FACE] @ seen_from.R_cam_head.T
     seen = FACE[(facing * depth).sum(axis=1) < -0.3 * np.linalg.norm(depth, axis=1)]
-    off: Array = np.linalg.norm(camera.project(found[seen]) - seen_from.project(true[seen]), axis=1)
-    return off
+    return np.linalg.norm(camera.project(found[seen]) - seen_from.project(true[seen]), axis=1)

@@ -74,13 +74,11 @@ def coded_hdr(codes: Array, transfer: int) -> Array:
     light = 203 * linear @ from_709.T
     if transfer == 16:
         power = (light / 10_000) ** 0.1593017578125
-        pq: Array = ((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375
-        return pq
+        return ((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375
     luminance = np.maximum(light @ [0.2627, 0.6780, 0.0593], 1e-9)[..., None] / 1000
     scene = light / 1000 * luminance ** (1 / 1.2 - 1)
     above = 0.17883277 * np.log(np.maximum(12 * scene - 0.28466892, 1e-9)) + 0.55991073
-    hlg: Array = np.where(scene <= 1 / 12, np.sqrt(3 * scene), above)
-    return hlg
+    return np.where(scene <= 1 / 12, np.sqrt(3 * scene), above)
 
 
 def hdr_written(

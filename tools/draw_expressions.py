@@ -110,8 +110,7 @@ def _front(head: Head) -> Float[Array, "n 3"]:
     """The face without its sides, which frames it closely."""
     face = head.mesh.vertices[load_generic_head().regions["face"] > 0.1]
     narrow = face[np.abs(face[:, 0]) < 55]
-    front: Array = narrow[narrow[:, 2] > narrow[:, 2].max() - 70]
-    return front
+    return narrow[narrow[:, 2] > narrow[:, 2].max() - 70]
 
 
 def _face_box(head: Head, name: str, camera: Camera) -> tuple[float, float, float, float]:

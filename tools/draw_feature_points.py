@@ -61,8 +61,7 @@ def _subregions(picture: Image.Image, layout: FeatureLayout, points: Float[Array
     colours = 255 * np.array([colorsys.hsv_to_rgb(hue, 0.85, 1.0) for hue in hues])
     on_face = _SHARE * subregions.fades.sum(axis=2, keepdims=True)
     mixed = np.asarray(picture) * (1 - on_face) + _SHARE * (subregions.fades @ colours)
-    tinted: Array = np.clip(mixed, 0, 255).astype(np.uint8)
-    return tinted
+    return np.clip(mixed, 0, 255).astype(np.uint8)
 
 
 if __name__ == "__main__":

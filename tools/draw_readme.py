@@ -61,8 +61,7 @@ def _performing(head: HeadRenderer) -> list[Array]:
 def _cropped(photo: Array) -> Array:
     """The upper part of a portrait in the pictures' shape."""
     height = min(len(photo), photo.shape[1] * _SIZE[1] // _SIZE[0])
-    small: Array = cv2.resize(photo[:height], _SIZE, interpolation=cv2.INTER_AREA)
-    return small
+    return cv2.resize(photo[:height], _SIZE, interpolation=cv2.INTER_AREA)
 
 
 if __name__ == "__main__":

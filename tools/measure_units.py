@@ -129,8 +129,7 @@ def _print_times(
 ) -> None:
     def posed(**weights: float) -> Array:
         added = [w * units[generic.unit_names.index(name)] for name, w in weights.items()]
-        vertices: Array = neutral + np.sum(added, axis=0)
-        return vertices
+        return neutral + np.sum(added, axis=0)
 
     apart, lids = posed(jawOpen=0.3), posed(eyeBlinkLeft=1.0, eyeLookDownLeft=1.0)
     lips = posed(mouthPucker=1.0, mouthShrugLower=0.6)

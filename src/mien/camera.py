@@ -66,8 +66,7 @@ class Camera:
     def project(self, points: Float[Array, "n 3"]) -> Float[Array, "n 2"]:
         """Head space in mm to pixels. A point at depth 0 or less has no meaningful image."""
         in_camera = self.to_camera(points)
-        pixels: Array = self.focal_px * in_camera[:, :2] / in_camera[:, 2:] + self.principal
-        return pixels
+        return self.focal_px * in_camera[:, :2] / in_camera[:, 2:] + self.principal
 
     def unproject(
         self, image_points: Float[Array, "n 2"], depth: Float[Array, " n"]
@@ -75,14 +74,12 @@ class Camera:
         """Pixels and depths (camera z, mm) to head space, mm: the inverse of project."""
         xy = (image_points - self.principal) / self.focal_px * depth[:, None]
         in_camera = np.column_stack([xy, depth])
-        points: Array = (in_camera - self.t_cam_head) @ self.R_cam_head
-        return points
+        return (in_camera - self.t_cam_head) @ self.R_cam_head
 
     def ray_directions(self, image_points: Float[Array, "n 2"]) -> Float[Array, "n 3"]:
         """Unit directions in head space of the rays that leave `center` through the pixels."""
         directions = self.unproject(image_points, np.ones(len(image_points))) - self.center
-        unit: Array = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-        return unit
+        return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
     def resized(self, factor: float) -> Camera:
         """The same view on an image scaled by this factor (sizes rounded)."""

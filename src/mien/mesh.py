@@ -78,8 +78,7 @@ class Mesh:
     def triangle_normals(self) -> Float[Array, "f 3"]:
         """Outward normals, length twice the triangle's area (mm^2)."""
         a, b, c = (self.vertices[self.triangles[:, corner]] for corner in range(3))
-        normals: Array = np.cross(b - a, c - a)
-        return normals
+        return np.cross(b - a, c - a)
 
     def vertex_normals(self) -> Float[Array, "v 3"]:
         """Outward unit normals, area-weighted; zero at a vertex that no triangle uses."""
@@ -88,8 +87,7 @@ class Mesh:
         for corner in range(3):
             np.add.at(normals, self.triangles[:, corner], faces)
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        unit: Array = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
-        return unit
+        return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
 
 
 def _check_indices(name: str, value: object, limit: int) -> Int[Array, "f 3"]:

@@ -165,8 +165,7 @@ def _stored() -> dict[str, Any]:
     import mien.assets
 
     path = Path(mien.assets.__file__).parent / "data" / "zhang134.json"
-    document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return document
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize(

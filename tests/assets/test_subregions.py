@@ -29,8 +29,7 @@ def layout() -> FeatureLayout:
 
 @pytest.fixture(scope="module")
 def points(layout: FeatureLayout) -> np.ndarray:
-    placed: np.ndarray = layout.template * SCALE + CENTRE
-    return placed
+    return layout.template * SCALE + CENTRE
 
 
 @pytest.fixture(scope="module")

@@ -68,8 +68,7 @@ def centroid(image: Array) -> Array:
     """(x, y) of the light, px."""
     light = image[..., 0].astype(float)
     rows, columns = np.mgrid[: image.shape[0], : image.shape[1]] + 0.5
-    place: Array = np.array([(light * columns).sum(), (light * rows).sum()]) / light.sum()
-    return place
+    return np.array([(light * columns).sum(), (light * rows).sum()]) / light.sum()
 
 
 @pytest.mark.parametrize(("yaw", "pitch", "roll"), [(0, 0, 0), (-15, 6, 4), (25, -8, -3)])

@@ -140,8 +140,7 @@ def test_the_head_turns_to_its_own_left(expressive: Path, timeline: Path, tmp_pa
 
 def middle_of(head: Head) -> Array:
     vertices = head.mesh.vertices
-    middle: Array = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    return middle
+    return (vertices.min(axis=0) + vertices.max(axis=0)) / 2
 
 
 def test_live_link_comes_back(expressive: Path, timeline: Path, mien: Mien, tmp_path: Path) -> None:

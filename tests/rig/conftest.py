@@ -36,8 +36,7 @@ class Rigged:
 
     def posed(self, **weights: float) -> Array:
         """(V, 3) mm: the units added up, nothing else."""
-        vertices: Array = self.neutral + np.tensordot(self.weights(**weights), self.units, axes=1)
-        return vertices
+        return self.neutral + np.tensordot(self.weights(**weights), self.units, axes=1)
 
     def moved(self, gaze: tuple[float, float] = (0.0, 0.0), **weights: float) -> Array:
         """(V, 3) mm: with turning eyes, contacts unresolved. Gaze is yaw and pitch, radians."""

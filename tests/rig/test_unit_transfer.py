@@ -17,8 +17,7 @@ VERTICES = GENERIC.mesh.vertices
 
 
 def unit(units: Array, name: str) -> Array:
-    chosen: Array = units[GENERIC.unit_names.index(name)]
-    return chosen
+    return units[GENERIC.unit_names.index(name)]
 
 
 def test_the_generic_heads_units_are_the_generic_units() -> None:

@@ -70,8 +70,7 @@ def found() -> ExpressionLook:
 
 def off(texture: Array, true: Array) -> Array:
     """(H, W) largest difference of a channel, grey levels."""
-    difference: Array = np.abs(texture.astype(int) - true).max(axis=2)
-    return difference
+    return np.abs(texture.astype(int) - true).max(axis=2)
 
 
 def test_the_texture_is_the_expressions_where_it_is_seen(found: ExpressionLook) -> None:

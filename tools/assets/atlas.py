@@ -86,8 +86,7 @@ def _islands(uvs: Float[Array, "u 2"], quads: Int[Array, "q 4"]) -> list[Int[Arr
 
 
 def _to_unit_square(uvs: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
-    unit: Array = (uvs - uvs.min(0)) / np.ptp(uvs, axis=0)
-    return unit
+    return (uvs - uvs.min(0)) / np.ptp(uvs, axis=0)
 
 
 def _magnified(x: Float[Array, " n"], centre: float, width: float, gain: float) -> Array:

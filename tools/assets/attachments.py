@@ -183,8 +183,7 @@ def _partners(frontal: Float[Array, "n 2"]) -> Int[Array, " n"]:
     """Left-right partners: the pairing under which the frontal points mirror each other best."""
     mirrored = [_SIZE, 0] + frontal * [-1, 1]
     distances = np.linalg.norm(frontal[:, None] - mirrored[None], axis=2)
-    partners: Array = linear_sum_assignment(distances + distances.T)[1]
-    return partners
+    return linear_sum_assignment(distances + distances.T)[1]
 
 
 def closest_on_mesh(
@@ -215,8 +214,7 @@ def _feet(point: Float[Array, " 3"], corners: Float[Array, "m 3 3"]) -> Float[Ar
     stacked = np.stack(candidates)
     gaps = np.linalg.norm((stacked[..., None] * corners).sum(2) - point, axis=2)
     best = stacked[gaps.argmin(0), np.arange(len(corners))]
-    feet: Array = np.where(inside[:, None], np.column_stack([1 - v - w, v, w]), best)
-    return feet
+    return np.where(inside[:, None], np.column_stack([1 - v - w, v, w]), best)
 
 
 def _edge_foot(point: Array, start: Array, end: Array, i: int, j: int) -> Float[Array, "m 3"]:

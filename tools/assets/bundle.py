@@ -139,5 +139,4 @@ def _outer_triangles(mesh: Mesh, regions: dict[str, Array]) -> Bool[Array, " f"]
     """(F,) eyeballs and the skin that is seen from outside."""
     inner = regions["mouth_cavity"] + regions["eye_socket"]
     parts = [PART_NAMES.index(name) for name in _FOR_LANDMARKS]
-    outer: Array = np.isin(mesh.part, parts) & (inner[mesh.triangles].max(1) == 0)
-    return outer
+    return np.isin(mesh.part, parts) & (inner[mesh.triangles].max(1) == 0)

@@ -118,8 +118,7 @@ def _front_midline(head: HeadCut) -> Int[Array, " n"]:
     skin = head.vertices_of("skin")
     own = skin[head.mirror[skin] == skin]
     front = own[head.vertices[own, 2] > 0]
-    sorted_front: Array = front[np.argsort(-head.vertices[front, 1], kind="stable")]
-    return sorted_front
+    return front[np.argsort(-head.vertices[front, 1], kind="stable")]
 
 
 def _midline_ridge(head: HeadCut) -> list[int]:

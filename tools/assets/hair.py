@@ -64,11 +64,9 @@ def add_hair(head: HeadCut, scalp: Float[Array, " v"]) -> HeadCut:
 def smoothstep(x: Float[Array, " n"]) -> Float[Array, " n"]:
     """0 below 0, 1 above 1, a cubic in between."""
     x = np.clip(x, 0.0, 1.0)
-    ramp: Array = x * x * (3 - 2 * x)
-    return ramp
+    return x * x * (3 - 2 * x)
 
 
 def _around(vertices: Float[Array, "n 3"]) -> Float[Array, " n"]:
     """Angle from the front, 0 to pi, the same on both sides."""
-    angle: Array = np.arctan2(np.abs(vertices[:, 0]), vertices[:, 2] - _SKULL_Z_MM)
-    return angle
+    return np.arctan2(np.abs(vertices[:, 0]), vertices[:, 2] - _SKULL_Z_MM)

@@ -155,8 +155,7 @@ def _axes(eyes: Float[Array, " 3"]) -> Float[Array, "3 3"]:
     x = eyes / np.linalg.norm(eyes)
     z = np.cross(x, (0.0, 1.0, 0.0))
     z /= np.linalg.norm(z)
-    axes: Array = np.stack([x, np.cross(z, x), z])
-    return axes
+    return np.stack([x, np.cross(z, x), z])
 
 
 def principal_modes(

@@ -29,8 +29,7 @@ def painted_mask(source: MakeHuman, head: HeadCut, name: str) -> Float[Array, " 
     rows = np.clip(((1 - uvs[..., 1]) * len(image)).astype(int), 0, len(image) - 1)
     columns = np.clip((uvs[..., 0] * image.shape[1]).astype(int), 0, image.shape[1] - 1)
     mask[head.quads[skin]] = image[rows, columns]
-    symmetric: Array = (mask + mask[head.mirror]) / 2
-    return symmetric
+    return (mask + mask[head.mirror]) / 2
 
 
 def enclosed(head: HeadCut, ring: tuple[int, int]) -> Float[Array, " v"]:
@@ -98,8 +97,7 @@ def _below_jaw(head: HeadCut) -> Float[Array, " v"]:
     edge = np.interp(-head.vertices[:, 2], depth, height)
     below = smoothstep((edge - head.vertices[:, 1]) / 14 + 0.2)
     behind_ear = smoothstep((-70 - head.vertices[:, 2]) / 10)
-    neck: Array = np.maximum(below, behind_ear)
-    return neck
+    return np.maximum(below, behind_ear)
 
 
 def _nose(x: Array, y: Array, z: Array) -> Float[Array, " v"]:

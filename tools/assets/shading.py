@@ -100,5 +100,4 @@ def shade(mesh: Mesh, camera: Camera, paint: Paint, look: Look) -> UInt8[Array, 
     image = np.where(off_axis < _IRIS_MM, np.array(_IRIS), image)
     image = np.where(off_axis < _PUPIL_MM, 0.03, image)
     image = np.where(raster.mask[:, :, None], image * lit[:, :, None] * look.brightness, 0.55)
-    pixels: Array = (255 * np.clip(image, 0, 1)).astype(np.uint8)
-    return pixels
+    return (255 * np.clip(image, 0, 1)).astype(np.uint8)

@@ -53,8 +53,7 @@ def _agreement(
         )
         for t in pair
     ]
-    product: Array = (normals[0] * normals[1]).sum(1)
-    return product
+    return (normals[0] * normals[1]).sum(1)
 
 
 def vertex_normals(vertices: Float[Array, "v 3"], quads: Int[Array, "q 4"]) -> Float[Array, "v 3"]:
@@ -66,5 +65,4 @@ def vertex_normals(vertices: Float[Array, "v 3"], quads: Int[Array, "q 4"]) -> F
     for corner in range(4):
         np.add.at(normals, quads[:, corner], across)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    unit: Array = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
-    return unit
+    return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)

@@ -63,8 +63,7 @@ def head_rotation(yaw: float, pitch: float, roll: float) -> Float[Array, "3 3"]:
     from scipy.spatial.transform import Rotation
 
     # Lower-case axes are fixed ones, turned about in the order of their letters.
-    matrix: Array = Rotation.from_euler("yxz", [yaw, pitch, roll]).as_matrix()
-    return matrix
+    return Rotation.from_euler("yxz", [yaw, pitch, roll]).as_matrix()
 
 
 def head_angles(rotation: Float[Array, "3 3"], *, order: str = "yxz") -> tuple[float, float, float]:

@@ -84,8 +84,7 @@ class Curve:
         a, b = self.values[start], self.values[end]
         cubic = _hermite(phase, a, b, self.slopes[1, start] * span, self.slopes[0, end] * span)
         straight = a + phase * (b - a)
-        found: Array = np.select([kind == _CUBIC, kind == _LINEAR], [cubic, straight], a)
-        return found
+        return np.select([kind == _CUBIC, kind == _LINEAR], [cubic, straight], a)
 
     @cached_property
     def _kinds(self) -> Int[Array, " k"]:
@@ -122,13 +121,12 @@ def sampled(
 def _hermite(u: Array, a: Array, b: Array, leaving: Array, arriving: Array) -> Array:
     """Cubic Hermite polynomial over u in [0, 1]; its slopes are per unit of u."""
     v = 1 - u
-    value: Array = (
+    return (
         (1 + 2 * u) * v * v * a
         + u * v * v * leaving
         + u * u * (3 - 2 * u) * b
         - u * u * v * arriving
     )
-    return value
 
 
 def _auto_slopes(times: Array, values: Array, holds: Array) -> Array:

@@ -30,8 +30,7 @@ def frames_of(timeline: Timeline, fps: float | None = None) -> Float[Array, " n"
     if count > MAX_FRAMES:
         found = f"{timeline.duration:g} s at {rate:g} frames a second"
         raise InputError("frames", f"at most {MAX_FRAMES}", found)
-    times: Array = np.arange(count) / rate
-    return times
+    return np.arange(count) / rate
 
 
 def moments(timeline: Timeline, fps: float | None = None) -> Iterator[Moment]:

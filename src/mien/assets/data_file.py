@@ -47,8 +47,7 @@ def read_data(path: Path, format_name: str, build: Callable[[dict[str, Any]], _K
 def need(data: Any, key: str, kind: type[_Kind], place: str = "") -> _Kind:
     """data[key], of this kind. Raises: Broken."""
     entry = strict_json.need(as_object(data, place), key, place)
-    value: _Kind = _READERS[kind](entry, join(place, key))
-    return value
+    return _READERS[kind](entry, join(place, key))
 
 
 def shares(

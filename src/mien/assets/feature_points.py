@@ -84,8 +84,7 @@ class FeatureLayout:
         Raises:
             InputError: shape, NaN.
         """
-        points: Array = self.mixes @ check_array("landmarks", landmarks, (LANDMARK_COUNT, 2))
-        return points
+        return self.mixes @ check_array("landmarks", landmarks, (LANDMARK_COUNT, 2))
 
     def frame(self, points: Float[Array, "n 2"]) -> Float[Array, "k 2"]:
         """Points around the face that follow the head and no expression, in the same pixels.

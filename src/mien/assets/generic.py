@@ -37,8 +37,7 @@ class IdentityBasis:
             expected = f"at most {len(self.components)} numbers"
             raise InputError("coefficients", expected, f"{len(coefficients)}")
         used = self.components[: len(coefficients)]
-        moved: Array = np.tensordot(coefficients, used, axes=1)
-        return moved
+        return np.tensordot(coefficients, used, axes=1)
 
 
 @dataclass(frozen=True)
@@ -104,8 +103,7 @@ class GenericHead:
         """
         vertices = check_array("vertices", vertices, self.mesh.vertices.shape)
         corners = vertices[self.mesh.triangles[self.landmark_triangles]]
-        positions: Array = (corners * self.landmark_barycentrics[..., None]).sum(axis=1)
-        return positions
+        return (corners * self.landmark_barycentrics[..., None]).sum(axis=1)
 
 
 @cache

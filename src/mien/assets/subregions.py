@@ -157,10 +157,7 @@ def _distance_to(mask: Bool[Array, "h w"]) -> Float[Array, "h w"]:
 
     if not mask.any():
         return np.full(mask.shape, 1e6, np.float32)
-    distances: Array = cv2.distanceTransform(
-        (~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
-    )
-    return distances
+    return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
 
 
 def _members(layout: FeatureLayout, drawing: SubregionDrawing) -> tuple[Int[Array, " m"], ...]:

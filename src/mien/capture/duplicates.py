@@ -47,5 +47,4 @@ def _thumbnail(pixels: UInt8[Array, "h w 3"]) -> Float[Array, "t t 3"]:
     import cv2
 
     size = (_THUMBNAIL, _THUMBNAIL)
-    small: Array = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA).astype(np.float64)
-    return small
+    return cv2.resize(pixels, size, interpolation=cv2.INTER_AREA).astype(np.float64)

@@ -34,13 +34,11 @@ class Pca:
 
     def coefficients(self, rows: Float[Array, "*n d"]) -> Float[Array, "*n c"]:
         """Where the points of the subspace nearest to the rows are, along its components."""
-        along: Array = (rows - self.mean) @ self.components.T
-        return along
+        return (rows - self.mean) @ self.components.T
 
     def project(self, rows: Float[Array, "*n d"]) -> Float[Array, "*n d"]:
         """The points of the subspace nearest to the rows."""
-        nearest: Array = self.mean + self.coefficients(rows) @ self.components
-        return nearest
+        return self.mean + self.coefficients(rows) @ self.components
 
 
 def fit_pca(rows: Float[Array, "n d"], components: int, *, centred: bool = True) -> Pca:

@@ -174,5 +174,4 @@ def _solve_within(matrix: Array, terms: Array, values: Array) -> Float[Array, "n
             f"interpolation through {len(matrix)} points is singular: some are too close together "
             "for this kernel and radius; add smoothing or choose a smaller radius"
         ) from None
-    coefficients: Array = free @ inner
-    return coefficients
+    return free @ inner

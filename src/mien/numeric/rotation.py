@@ -37,8 +37,7 @@ def angle_between(
 ) -> Float[Array, "*batch"]:
     """Angle in radians of the rotation that takes a to b."""
     relative = np.asarray(b) @ np.swapaxes(np.asarray(a), -1, -2)
-    angles: Array = np.linalg.norm(rotation_to_vector(relative), axis=-1)
-    return angles
+    return np.linalg.norm(rotation_to_vector(relative), axis=-1)
 
 
 def cross_matrix(vector: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3 3"]:

@@ -21,8 +21,7 @@ class Similarity:
     translation: Float[Array, " 3"]
 
     def __call__(self, points: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
-        moved: Array = self.scale * points @ self.rotation.T + self.translation
-        return moved
+        return self.scale * points @ self.rotation.T + self.translation
 
 
 def estimate_similarity(

@@ -199,8 +199,7 @@ def _outside_notes(
 
 def _beyond(points: Float[Array, "k 2"], size: tuple[int, int]) -> Float[Array, " k"]:
     """How far points lie outside of a picture, px; below 0 inside."""
-    far: Array = np.maximum(-points, points - size).max(axis=1)
-    return far
+    return np.maximum(-points, points - size).max(axis=1)
 
 
 def _told_outside(

@@ -125,8 +125,7 @@ def epipolar_lines(
         ]
     )
     size = np.linalg.norm(lines[:, :2], axis=1, keepdims=True)
-    unit: Array = np.divide(lines, size, out=np.full(lines.shape, np.nan), where=size > 0)
-    return unit
+    return np.divide(lines, size, out=np.full(lines.shape, np.nan), where=size > 0)
 
 
 def _checked_fractions(fractions: object, count: int | None) -> Float[Array, " n"]:
@@ -201,5 +200,4 @@ def _filled(chosen: Float[Array, " n"], expected: Float[Array, " n"]) -> Float[A
     known = np.isfinite(chosen)
     places = np.concatenate([[0.0], expected[known], [1.0]])
     fractions = np.concatenate([[0.0], chosen[known], [1.0]])
-    filled: Array = np.where(known, chosen, np.interp(expected, places, fractions))
-    return filled
+    return np.where(known, chosen, np.interp(expected, places, fractions))

@@ -55,27 +55,21 @@ class Features:
     @property
     def seen(self) -> Bool[Array, "k n"]:
         """(K, N) where a photo shows a feature."""
-        seen: Array = np.asarray(np.isfinite(self.sigma_mm))
-        return seen
+        return np.asarray(np.isfinite(self.sigma_mm))
 
     @property
     def on_edges(self) -> Bool[Array, " n"]:
         """(N,) landmarks on something that can be seen."""
-        on_edges: Array = np.isin(self.names, [f"landmark {number}" for number in ON_EDGES])
-        return on_edges
+        return np.isin(self.names, [f"landmark {number}" for number in ON_EDGES])
 
     def on(self, vertices: Float[Array, "... v 3"]) -> Float[Array, "... n 3"]:
         """Where the features lie on a head (or on each of a stack of offset fields), mm."""
-        places: Array = np.einsum(
-            "nc,...ncd->...nd", self.barycentrics, vertices[..., self.corners, :]
-        )
-        return places
+        return np.einsum("nc,...ncd->...nd", self.barycentrics, vertices[..., self.corners, :])
 
     def sigma_px(self, cameras: Sequence[Camera]) -> Float[Array, "k n"]:
         """(K, N) px: the observations' deviations as these cameras see them; inf where unseen."""
         px_per_mm = [camera.focal_px / camera.t_cam_head[2] for camera in cameras]
-        sigma: Array = self.sigma_mm * np.array(px_per_mm)[:, None]
-        return sigma
+        return self.sigma_mm * np.array(px_per_mm)[:, None]
 
     def of_photos(self, keep: Bool[Array, " k"]) -> Features:
         """Only these photos; features that none of them shows are dropped."""
@@ -214,8 +208,7 @@ def _fractions(generic: GenericHead, name: str) -> Float[Array, " n"]:
     """Arc-length positions in [0, 1] of a polyline's vertices on the generic head."""
     line = generic.mesh.vertices[list(generic.polylines[name])]
     lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
-    fractions: Array = lengths / lengths[-1]
-    return fractions
+    return lengths / lengths[-1]
 
 
 def _length(curve: Float[Array, "m 2"]) -> float:

@@ -179,5 +179,4 @@ def residuals_of(
 ) -> Float[Array, "k n 2"]:
     """(K, N, 2) px: where the features of a head are seen, less where they were found."""
     projected = np.stack([camera.project(features.on(vertices)) for camera in cameras])
-    residuals: Array = projected - features.image_points
-    return residuals
+    return projected - features.image_points

@@ -35,8 +35,7 @@ class Sightings:
 
     def on(self, values: Float[Array, "... v c"]) -> Float[Array, "... m c"]:
         """Per-vertex values at the places."""
-        at: Array = np.einsum("mc,...mcd->...md", self.barycentrics, values[..., self.corners, :])
-        return at
+        return np.einsum("mc,...mcd->...md", self.barycentrics, values[..., self.corners, :])
 
     def of(self, keep: Bool[Array, " m"]) -> Sightings:
         """Some of them."""

@@ -76,8 +76,7 @@ def texel_areas(uvs: Float[Array, "f 3 2"], pyramids: Pyramids) -> Float[Array, 
     """(F,) how many texels of the finest level the triangles with these corners cover."""
     corners = uvs * [pyramids.widths[0], pyramids.heights[0]]
     b, c = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    areas: Array = np.abs(b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]) / 2
-    return areas
+    return np.abs(b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]) / 2
 
 
 def level_of_detail(

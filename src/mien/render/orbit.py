@@ -92,8 +92,7 @@ def _turn_head(yaw: float, pitch: float) -> Float[Array, "3 3"]:
     about_y = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
     c, s = np.cos(pitch), np.sin(pitch)
     about_x = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-    turned: Array = about_x @ about_y
-    return turned
+    return about_x @ about_y
 
 
 def _about_z(angle: float) -> Float[Array, "3 3"]:

@@ -46,8 +46,7 @@ def overlay_mesh(
     if drawn is photo:
         drawn = photo.copy()
     cv2.polylines(drawn, list(_fixed_point(ends)), False, colour, 1, cv2.LINE_AA, _SHIFT)
-    mixed: Array = cv2.addWeighted(drawn, opacity, photo, 1 - opacity, 0)
-    return mixed
+    return cv2.addWeighted(drawn, opacity, photo, 1 - opacity, 0)
 
 
 def draw_points(
@@ -77,11 +76,9 @@ def _visible_edges(mesh: Mesh, camera: Camera) -> Int[Array, "e 2"]:
     seen = seen[np.einsum("fc,fc->f", facing, mesh.triangle_normals()[seen]) > 0]
     triangles = mesh.triangles[seen]
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    unique: Array = np.unique(np.sort(edges, axis=1), axis=0)
-    return unique
+    return np.unique(np.sort(edges, axis=1), axis=0)
 
 
 def _fixed_point(points: Array) -> Int[Array, "*n 2"]:
     """OpenCV puts the first pixel's centre at 0, not at 0.5."""
-    fixed: Array = np.rint((points - 0.5) * 2**_SHIFT).astype(np.int32)
-    return fixed
+    return np.rint((points - 0.5) * 2**_SHIFT).astype(np.int32)

@@ -42,10 +42,7 @@ def _face(example: Example) -> UInt8[Array, "h w 3"]:
     # Of the middle, in OpenCV's pixels, whose first has its centre at 0.
     matrix[:, 2] = np.array(_CELL) / 2 - 0.5 - scale * (middle - 0.5)
     how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
-    picture: Array = cv2.warpAffine(
-        example.photo, matrix, _CELL, flags=how, borderMode=cv2.BORDER_REPLICATE
-    )
-    return picture
+    return cv2.warpAffine(example.photo, matrix, _CELL, flags=how, borderMode=cv2.BORDER_REPLICATE)
 
 
 def _words(name: str, reason: str) -> UInt8[Array, "h w 3"]:

@@ -105,8 +105,7 @@ def _face_pixels(head: Head, name: str, camera: Camera) -> Bool[Array, "h w"]:
     grey = np.where(load_generic_head().regions["face"] > 0.5, 255.0, 0.0)
     colours = np.repeat(grey[:, None], 3, axis=1)
     seen = render(head.expression_mesh(name), camera, vertex_colours=colours)
-    inside: Array = (seen[..., 0] > 200) & (seen[..., 3] > 0)
-    return inside
+    return (seen[..., 0] > 200) & (seen[..., 3] > 0)
 
 
 def _facing(camera: Camera) -> float:
@@ -133,5 +132,4 @@ def _scaled(box: tuple[slice, slice], factor: float) -> tuple[slice, slice]:
 def _small(picture: UInt8[Array, "h w 3"], factor: float) -> UInt8[Array, "h w 3"]:
     import cv2
 
-    small: Array = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-    return small
+    return cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)

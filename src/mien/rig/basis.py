@@ -114,8 +114,7 @@ class Basis:
         """Blending weights, which sum to 1. Raises: InputError: another number of parameters."""
         alpha = np.asarray(alpha, dtype=np.float64)
         _check_last_axis("alpha", alpha, self.Q.shape[1])
-        weights: Array = alpha @ self.Q.T + self.w_star
-        return weights
+        return alpha @ self.Q.T + self.w_star
 
     def alpha(self, weights: Float[Array, "*batch m"]) -> Float[Array, "*batch k"]:
         """The parameters whose weights come nearest in least squares; exact where Q reaches.
@@ -125,8 +124,7 @@ class Basis:
         """
         weights = np.asarray(weights, dtype=np.float64)
         _check_last_axis("weights", weights, len(self.Q))
-        alpha: Array = (weights - self.w_star) @ self._inverse.T
-        return alpha
+        return (weights - self.w_star) @ self._inverse.T
 
     @cached_property
     def _inverse(self) -> Float[Array, "k m"]:

@@ -203,8 +203,7 @@ def _fit_shading(
 def _tint(surface: SurfaceMap, mesh: Mesh, base: UInt8[Array, "h w 3"]) -> Float[Array, " 3"]:
     """(3,) by how much the person's skin is darker or warmer than skin usually is in photos."""
     skin = base[parts_of(surface, mesh, "skin")]
-    tint: Array = np.clip(np.median(skin, axis=0) / np.array(SKIN.default), *_TINTS)
-    return tint
+    return np.clip(np.median(skin, axis=0) / np.array(SKIN.default), *_TINTS)
 
 
 def _by_seen(looks: Mapping[str, ExpressionLook], texels: Bool[Array, "h w"]) -> list[str]:

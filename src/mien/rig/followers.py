@@ -16,8 +16,7 @@ _LEAST_MM = 0.2
 
 def part_vertices(generic: GenericHead, *parts: str) -> Int[Array, " p"]:
     """The vertices of the named parts, ascending. Raises: InputError: no such part."""
-    found: Array = np.unique(generic.mesh.triangles[generic.mesh.triangles_of(*parts)])
-    return found
+    return np.unique(generic.mesh.triangles[generic.mesh.triangles_of(*parts)])
 
 
 @dataclass(frozen=True)
@@ -55,5 +54,4 @@ class Followers:
 
     def carried(self, offsets: Float[Array, "*k v 3"]) -> Float[Array, "*k n 3"]:
         """(..., N, 3) what offsets of the skin add to the followers."""
-        moved: Array = np.einsum("...nic,ni->...nc", offsets[..., self.carriers, :], self.weights)
-        return moved
+        return np.einsum("...nic,ni->...nc", offsets[..., self.carriers, :], self.weights)

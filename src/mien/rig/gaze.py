@@ -57,8 +57,7 @@ class Eyeball:
 
     def on_sphere(self, points: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
         """(N, 3) the points where the eyeball is the unit sphere around the origin."""
-        inside: Array = (points - self.centre) @ self.inverse.T
-        return inside
+        return (points - self.centre) @ self.inverse.T
 
     def turned(self, points: Float[Array, "n 3"], yaw: float, pitch: float) -> Float[Array, "n 3"]:
         """(N, 3) mm: points of the eyeball when it looks there (radians) and not straight ahead.
@@ -69,16 +68,14 @@ class Eyeball:
         """
         if yaw == 0 and pitch == 0:
             return points
-        result: Array = _turned(points, self.shape, self.inverse, yaw, pitch)
-        return result
+        return _turned(points, self.shape, self.inverse, yaw, pitch)
 
 
 @njit(cache=True, nogil=True)
 def _turned(points: Array, shape: Array, inverse: Array, yaw: float, pitch: float) -> Array:
     linear = shape @ _turn(inverse, yaw, pitch) @ inverse
     middle = points.sum(axis=0) / len(points)
-    turned: Array = middle + (points - middle) @ linear.T
-    return turned
+    return middle + (points - middle) @ linear.T
 
 
 @njit(cache=True, nogil=True)
@@ -204,8 +201,7 @@ class Look:
         """How far the eyeLook units would turn the eyeballs as the gaze does, lagging beyond 1."""
         size = (self.angles**2).sum(axis=1)
         shares = np.maximum(self.angles @ gaze / size, 0.0)
-        lagging: Array = np.minimum(shares, 1.0) + _LAG * np.maximum(shares - 1.0, 0.0)
-        return lagging
+        return np.minimum(shares, 1.0) + _LAG * np.maximum(shares - 1.0, 0.0)
 
 
 def _side(unit: str) -> str:

@@ -123,5 +123,4 @@ def check_masks(masks: Mapping[str, object], vertices: int) -> dict[str, Float[A
 def _left_share(x: Float[Array, " v"]) -> Float[Array, " v"]:
     """(V,) smoothly from 0 on the subject's right to 1 on the left."""
     t = np.clip(x / _MIDLINE_MM + 0.5, 0, 1)
-    share: Array = t * t * (3 - 2 * t)
-    return share
+    return t * t * (3 - 2 * t)

@@ -163,8 +163,7 @@ class Rig:
         """
         _check_known("region", region, AROUND)
         inside = [region in (name, *AROUND[name]) for name in MASKS]
-        mask: Array = self._shares[:, [*inside, region == FACE]].sum(axis=1)
-        return mask
+        return self._shares[:, [*inside, region == FACE]].sum(axis=1)
 
     def hull_notes(self, state: FaceState) -> tuple[str, ...]:
         """What a state asks for beyond the expressions that were photographed, by its regions.

@@ -69,8 +69,7 @@ def brightness_at(
     parts = (EYES, EYES, TEETH)
     c0, c1, c2 = np.array([polynomials[part] for part in parts]).T
     o = np.clip(openings, 0, [MOST_OPEN[part] for part in parts])
-    clipped: Array = np.clip(c0 + o * (c1 + o * c2), *_RANGE)
-    return clipped
+    return np.clip(c0 + o * (c1 + o * c2), *_RANGE)
 
 
 def fit_polynomial(part: str, measured: Sequence[tuple[float, float, float]]) -> Polynomial:

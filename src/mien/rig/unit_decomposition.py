@@ -53,8 +53,7 @@ class RegionUnits:
         wanted = units * self.units
         if not wanted.any() or not len(self.expressions):
             return np.zeros(len(self.expressions))
-        shares: Array = nnls(self.R, self.Q @ np.append(wanted, _TOGETHER))[0][:-1]
-        return shares
+        return nnls(self.R, self.Q @ np.append(wanted, _TOGETHER))[0][:-1]
 
 
 @dataclass(frozen=True)

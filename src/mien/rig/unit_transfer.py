@@ -91,8 +91,7 @@ def local_stretch(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[
     size = np.trace(covariance, axis1=1, axis2=2)[:, None, None] / 3
     ridge = _RIDGE * size * np.eye(3) + 1e-9 * np.eye(3)
     correction = np.linalg.solve(covariance + ridge, cross)
-    stretch: Array = whole + np.swapaxes(correction, 1, 2)
-    return stretch
+    return whole + np.swapaxes(correction, 1, 2)
 
 
 def _moments(
@@ -104,16 +103,14 @@ def _moments(
     total = np.maximum(np.asarray(weights.sum(axis=1)), 1e-12)
     mean = (weights @ both) / total
     second = ((weights @ products) / total).reshape(-1, 3, 6)
-    central: Array = second - mean[:, :3, None] * mean[:, None, :]
-    return central
+    return second - mean[:, :3, None] * mean[:, None, :]
 
 
 def _affine(source: Float[Array, "n 3"], target: Float[Array, "n 3"]) -> Float[Array, "3 3"]:
     """Linear part of the affine map that takes source nearest to target."""
     centred = source - source.mean(axis=0)
     found = np.linalg.lstsq(centred, target - target.mean(axis=0), rcond=None)[0]
-    linear: Array = found.T
-    return linear
+    return found.T
 
 
 def _integrated(
@@ -213,5 +210,4 @@ def _chin(generic: GenericHead) -> Int[Array, " c"]:
         generic.mesh.vertices[skin] - generic.mesh.vertices[generic.vertex_of("chin")], axis=1
     )
     near: Bool[Array, " s"] = distance < _CHIN_MM
-    chin: Array = skin[near]
-    return chin
+    return skin[near]

@@ -47,5 +47,4 @@ def fill_gutters(pixels: Array, inside: Bool[Array, "h w"]) -> Array:
     )
     nearest = np.zeros(labels.max() + 1, np.intp)
     nearest[labels[inside]] = np.flatnonzero(inside)
-    filled: Array = pixels.reshape(-1, pixels.shape[2])[nearest[labels]]
-    return filled
+    return pixels.reshape(-1, pixels.shape[2])[nearest[labels]]

@@ -41,8 +41,7 @@ class Cylinder:
         """(..., 2) texture coordinates of points in head space (mm); u from 0 to 1."""
         angle = np.arctan2(points[..., 0] - self.axis_x, points[..., 2] - self.axis_z)
         height = (points[..., 1] - self.bottom) / (self.top - self.bottom)
-        uvs: Array = np.stack([angle / (2 * np.pi) + 0.5, height], axis=-1)
-        return uvs
+        return np.stack([angle / (2 * np.pi) + 0.5, height], axis=-1)
 
 
 def fit_cylinder(mesh: Mesh, *parts: str) -> Cylinder:

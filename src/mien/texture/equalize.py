@@ -54,8 +54,7 @@ def estimate_gains(
         return np.ones((count, 3))
     # Of all solutions the one of least norm: its mean over photos that overlap is zero.
     logs, *_ = np.linalg.lstsq(np.array(rows), np.array(targets), rcond=None)
-    gains: Array = np.exp(logs)
-    return gains
+    return np.exp(logs)
 
 
 def _samples(

@@ -226,8 +226,7 @@ def _background(surface: SurfaceMap, backdrop: Backdrop) -> Float[Array, "h w 3"
     height, width = surface.triangle_ids.shape
     if not surface.wrap:
         return np.zeros((height, width, 3), np.float32)
-    wide: Array = cv2.resize(backdrop.images[-1], (width, height), interpolation=cv2.INTER_LINEAR)
-    return wide
+    return cv2.resize(backdrop.images[-1], (width, height), interpolation=cv2.INTER_LINEAR)
 
 
 def _box(texels: Bool[Array, "h w"], wrap: bool) -> tuple[slice, slice] | None:

@@ -193,8 +193,7 @@ def _union(
     regions: Mapping[str, Float[Array, " v"]], names: tuple[str, ...], shape: tuple[int, ...]
 ) -> Float[Array, " v"]:
     masks = [check_array(name, regions[name], shape) for name in names if name in regions]
-    union: Array = np.max([np.zeros(shape), *masks], axis=0)
-    return union
+    return np.max([np.zeros(shape), *masks], axis=0)
 
 
 def _within(blend: Blend, surface: SurfaceMap, mesh: Mesh, mask: Float[Array, " v"]) -> Blend:

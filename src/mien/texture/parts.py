@@ -85,5 +85,4 @@ def _white(blend: Blend, default: Float[Array, " 3"]) -> Float[Array, " 3"]:
         return default
     tone = np.median(seen[chosen], axis=0)
     # Some of it may be a lid's skin for all that: the light's brightness, but half of its hue.
-    white: Array = (tone + default * (tone.mean() / default.mean())) / 2
-    return white
+    return (tone + default * (tone.mean() / default.mean())) / 2

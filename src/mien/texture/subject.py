@@ -90,8 +90,7 @@ def _cut(image: Array, inside: Array, strip: float) -> Bool[Array, "h w"]:
     models = np.zeros((2, 1, 65))
     bgr = np.ascontiguousarray(image[..., ::-1])
     cv2.grabCut(bgr, labels, None, models[0], models[1], 3, cv2.GC_INIT_WITH_MASK)
-    person: Array = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
-    return person
+    return (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
 
 
 def _contrast(image: Array, inside: Array, strip: float) -> Array:
@@ -110,5 +109,4 @@ def _contrast(image: Array, inside: Array, strip: float) -> Array:
         sums = cv2.GaussianBlur(image.astype(np.float32) * side[..., None], (0, 0), sigma)
         means.append(sums / np.maximum(weight, 1e-4)[..., None])
         near &= weight > 0.02
-    contrast: Array = np.linalg.norm(means[0] - means[1], axis=2) * near
-    return contrast
+    return np.linalg.norm(means[0] - means[1], axis=2) * near

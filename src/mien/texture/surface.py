@@ -35,8 +35,7 @@ class SurfaceMap:
     @property
     def mask(self) -> Bool[Array, "h w"]:
         """(H, W) bool: where there is a surface."""
-        inside: Array = self.triangle_ids >= 0
-        return inside
+        return self.triangle_ids >= 0
 
 
 def surface_from(

@@ -55,5 +55,4 @@ def _arch_length(x: Float[Array, " n"], z: Float[Array, " n"]) -> Float[Array, "
     drop = (front - float(z.min())) / half**2
     steps = np.linspace(0, half, 200)
     length = np.cumsum(np.hypot(1, 2 * drop * steps)) * (steps[1] - steps[0])
-    along: Array = np.sign(x) * np.interp(np.abs(x), steps, length - length[0])
-    return along
+    return np.sign(x) * np.interp(np.abs(x), steps, length - length[0])

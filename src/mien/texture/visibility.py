@@ -174,10 +174,9 @@ def _halved(photo: Array) -> Array:
     import cv2
 
     height, width = photo.shape[0] // 2, photo.shape[1] // 2
-    half: Array = cv2.resize(
+    return cv2.resize(
         photo[: 2 * height, : 2 * width], (width, height), interpolation=cv2.INTER_AREA
     )
-    return half
 
 
 def _halved_camera(camera: Camera) -> Camera:
@@ -226,8 +225,7 @@ def _distance(mask: Bool[Array, "h w"]) -> Float[Array, "h w"]:
     """To the nearest pixel outside the mask; the photo's border is none."""
     import cv2
 
-    distance: Array = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    return distance
+    return cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
 
 
 @njit(cache=True, nogil=True)

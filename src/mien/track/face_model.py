@@ -193,8 +193,7 @@ def within_range(weights: Float[Array, "r k"]) -> Float[Array, "r k"]:
     low, high = WEIGHT_RANGE
     mean = 1 / weights.shape[1]
     farthest = np.maximum((weights - mean) / (high - mean), (weights - mean) / (low - mean))
-    bounded: Array = mean + (weights - mean) / np.maximum(farthest.max(axis=1, keepdims=True), 1)
-    return bounded
+    return mean + (weights - mean) / np.maximum(farthest.max(axis=1, keepdims=True), 1)
 
 
 def _is_expressive(unit: str) -> bool:

@@ -104,8 +104,7 @@ def _line_shares(u: Float[Array, " n"]) -> Float[Array, " n"]:
     s0, s1, s2 = (float((weights * u**power).sum()) for power in range(3))
     if s0 * s2 - s1 * s1 < 1e-12:  # all at one time
         return weights / s0
-    shares: Array = weights * (s2 - s1 * u) / (s0 * s2 - s1 * s1)
-    return shares
+    return weights * (s2 - s1 * u) / (s0 * s2 - s1 * s1)
 
 
 def _low_pass_shares(step: float) -> Float[Array, " 3"]:

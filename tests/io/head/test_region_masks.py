@@ -48,8 +48,7 @@ def folder(masked: Head, tmp_path: Path) -> Path:
 def raised(head: Head, region: str) -> Array:
     """(V,) how far each vertex of the skin goes up, of 1, with a region in the other expression."""
     face = Rig(head).evaluate(FaceState({region: {"up": 1.0}}), contacts=False)
-    rise: Array = (face.vertices - head.mesh.vertices)[SKIN, 1] / 10
-    return rise
+    return (face.vertices - head.mesh.vertices)[SKIN, 1] / 10
 
 
 def test_masks_come_back(masked: Head, folder: Path) -> None:

@@ -72,8 +72,7 @@ def off_surface_mm(vertices: Array, truth: Array, part: Array) -> Array:
         nearest = shown[tree.query(laid)[1]]
         along = ((laid - truth[nearest]) * normals[nearest]).sum(axis=1)
         laid = estimate_similarity(laid, laid - along[:, None] * normals[nearest])(laid)
-    off: Array = np.abs(along)
-    return off
+    return np.abs(along)
 
 
 def test_surface(found: Registration, ann: Person) -> None:

@@ -42,8 +42,7 @@ def swollen() -> Array:
     """The generic head with a smooth bump of 2 mm on one cheek and 1 mm everywhere."""
     mesh = GENERIC.mesh
     bump = np.exp(-((mesh.vertices - [35.0, -45.0, 20.0]) ** 2).sum(axis=1) / (2 * 20.0**2))
-    moved: Array = mesh.vertices + (1 + 2 * bump)[:, None] * mesh.vertex_normals()
-    return moved
+    return mesh.vertices + (1 + 2 * bump)[:, None] * mesh.vertex_normals()
 
 
 def test_offsets_are_the_distances_along_the_normals(swollen: Array) -> None:

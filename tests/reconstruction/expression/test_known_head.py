@@ -49,8 +49,7 @@ def sightings_in(view: View, known: KnownHead) -> Sightings:
 def off_px(seen: Sightings) -> Array:
     """(M,) how far the photo shows them off where they are expected on the true head."""
     there = CAMERA.project(seen.on(TRUE) + seen.beside)
-    off: Array = np.linalg.norm(there - seen.image_points, axis=1)
-    return off
+    return np.linalg.norm(there - seen.image_points, axis=1)
 
 
 def share_believed(cameras: Sequence[Camera]) -> float:

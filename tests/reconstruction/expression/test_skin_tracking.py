@@ -27,8 +27,7 @@ def followed(start: Array, *, mm_per_px: float = 0.8, known: KnownHead = KNOWN) 
 
 
 def off_px(found: Sightings) -> Array:
-    off: Array = np.linalg.norm(CAMERA.project(found.on(TRUE)) - found.image_points, axis=1)
-    return off
+    return np.linalg.norm(CAMERA.project(found.on(TRUE)) - found.image_points, axis=1)
 
 
 @pytest.mark.parametrize(("mm_per_px", "most"), [(0.8, 0.1), (1.6, 0.2)])

@@ -50,8 +50,7 @@ def whole(drawing: Drawing) -> Array:
     parts = np.where(drawing.ids >= 0, part[shown[drawing.ids, 0]], -1)
     depth = np.where(drawing.ids >= 0, drawing.depth, 2000.0)
     flat = maximum_filter(depth, 5) - minimum_filter(depth, 5) < 12
-    alike: Array = flat & (maximum_filter(parts, 5) == minimum_filter(parts, 5))
-    return alike
+    return flat & (maximum_filter(parts, 5) == minimum_filter(parts, 5))
 
 
 def both(scene: Scene, *, plain: bool, exact: bool = False) -> tuple[Equations, Equations]:
@@ -137,8 +136,7 @@ def test_flows_are_those_of_the_projection(rng: np.random.Generator) -> None:
     def projected(guess: Guess) -> Array:
         face = model.posed(scene.anchor, guess.face)
         places = face.vertices[chosen] @ guess.pose.R.T + guess.pose.t
-        pixels: Array = scene.view.focal * guess.pose.zoom * places[:, :2] / places[:, 2:]
-        return pixels
+        return scene.view.focal * guess.pose.zoom * places[:, :2] / places[:, 2:]
 
     for unknown, step in enumerate(1e-4 * np.eye(COUNT)):
         change = (projected(GUESS.moved(step)) - projected(GUESS.moved(-step))) / 2e-4

@@ -63,8 +63,7 @@ def inside_picture(
 
     is a guess.
     """
-    inside: Array = np.all((points >= 0) & (points <= np.asarray(size)), axis=1)
-    return inside
+    return np.all((points >= 0) & (points <= np.asarray(size)), axis=1)
 
 
 def is_cut(points: Float[Array, "n 2"], size: tuple[int, int] | Int[Array, " 2"]) -> bool:
@@ -103,8 +102,7 @@ def facing_confidence(
     triangles = Delaunay(frontal[:, :2]).simplices
     normals = _vertex_normals(frontal, triangles)
     facing = -(normals @ R_cam_head.T)[:, 2]
-    weights: Array = np.clip((facing - 0.1) / 0.8, 0.0, 1.0)
-    return weights
+    return np.clip((facing - 0.1) / 0.8, 0.0, 1.0)
 
 
 def _vertex_normals(points: Float[Array, "n 3"], triangles: Int[Array, "f 3"]) -> Array:
@@ -116,5 +114,4 @@ def _vertex_normals(points: Float[Array, "n 3"], triangles: Int[Array, "f 3"]) -
     for corner in range(3):
         np.add.at(normals, triangles[:, corner], face_normals)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    unit: Array = normals / np.maximum(lengths, np.finfo(float).tiny)
-    return unit
+    return normals / np.maximum(lengths, np.finfo(float).tiny)

@@ -187,8 +187,7 @@ class FaceNetwork:
 def _nearest_rotation(matrix: Array) -> Float[Array, "3 3"]:
     """The network's matrix carries a scale and single-precision noise."""
     left, _, right = np.linalg.svd(np.asarray(matrix, dtype=np.float64))
-    rotation: Array = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    return rotation
+    return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
 
 
 @contextmanager

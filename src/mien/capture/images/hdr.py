@@ -116,8 +116,7 @@ def _tables(transfer: int) -> _Tables:
 def _scene_light(signal: Float[Array, " n"]) -> Float[Array, " n"]:
     """HLG's inverse OETF."""
     a, b, c = 0.17883277, 0.28466892, 0.55991073
-    light: Array = np.where(signal <= 0.5, signal**2 / 3, (np.exp((signal - c) / a) + b) / 12)
-    return light
+    return np.where(signal <= 0.5, signal**2 / 3, (np.exp((signal - c) / a) + b) / 12)
 
 
 def _pq_light(signal: Float[Array, " n"]) -> Float[Array, " n"]:
@@ -125,8 +124,7 @@ def _pq_light(signal: Float[Array, " n"]) -> Float[Array, " n"]:
     m1, m2 = 2610 / 16384, 2523 / 4096 * 128
     c1, c2, c3 = 3424 / 4096, 2413 / 4096 * 32, 2392 / 4096 * 32
     power = signal ** (1 / m2)
-    light: Array = 10_000 * (np.maximum(power - c1, 0) / (c2 - c3 * power)) ** (1 / m1)
-    return light
+    return 10_000 * (np.maximum(power - c1, 0) / (c2 - c3 * power)) ** (1 / m1)
 
 
 def _srgb(linear: Array) -> Array:

@@ -113,8 +113,7 @@ def shrunk(pixels: UInt8[Array, "h w 3"], side: int) -> UInt8[Array, "h w 3"]:
     if factor >= 1:
         return pixels
     size = max(1, round(width * factor)), max(1, round(height * factor))
-    small: Array = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
-    return small
+    return cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
 
 
 def _shrunk_rgb(image: Image, max_side: int, notes: list[str]) -> Image:

@@ -87,8 +87,7 @@ def choose_frames(scores: FrameScores, count: int) -> Int[Array, " m"]:
         chosen.append(best)
         distance = np.minimum(distance, np.linalg.norm(pose - pose[best], axis=1))
         target = int(distance.argmax())
-    rows: Array = np.sort(usable[chosen])
-    return rows
+    return np.sort(usable[chosen])
 
 
 def _usable(scores: FrameScores) -> Int[Array, " m"]:
@@ -107,8 +106,7 @@ def sharp_rows(scores: FrameScores, rows: Int[Array, " n"]) -> Int[Array, " m"]:
     if not len(rows):
         return rows
     sharpness = scores.sharpness[rows]
-    sharp: Array = rows[sharpness >= _SHARP_SHARE * np.median(sharpness)]
-    return sharp
+    return rows[sharpness >= _SHARP_SHARE * np.median(sharpness)]
 
 
 def _unrest(scores: FrameScores) -> Float[Array, " n"]:
@@ -119,12 +117,10 @@ def _unrest(scores: FrameScores) -> Float[Array, " n"]:
     """
     upper, mouth = scores.blendshapes[:, _SHAPED & ~_OF_MOUTH], scores.blendshapes[:, _OF_MOUTH]
     usual = np.linalg.norm(upper - np.median(upper, axis=0), axis=1)
-    unrest: Array = usual + np.linalg.norm(mouth, axis=1) + _OPEN_LIPS * scores.lips_apart
-    return unrest
+    return usual + np.linalg.norm(mouth, axis=1) + _OPEN_LIPS * scores.lips_apart
 
 
 def expression_distance(blendshapes: Float[Array, "n 52"], row: int) -> Float[Array, " n"]:
     """How far each frame's expression is from that of one: 0.2 is alike, 1.5 a broad smile."""
     shaped = blendshapes[:, _SHAPED]
-    distances: Array = np.linalg.norm(shaped - shaped[row], axis=1)
-    return distances
+    return np.linalg.norm(shaped - shaped[row], axis=1)

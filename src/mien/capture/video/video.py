@@ -214,7 +214,7 @@ def _open(path: Path) -> InputContainer:
     lenient = {"metadata_errors": "replace"} if int(av.__version__.split(".")[0]) < 19 else {}
     try:
         # Without "file:" a name like "concat:a" would be an address.
-        return av.open(f"file:{path}", container_options=_OPTIONS, **lenient)  # type: ignore[call-overload,no-any-return]
+        return av.open(f"file:{path}", container_options=_OPTIONS, **lenient)  # type: ignore[call-overload]
     except av.FFmpegError as error:
         reason = one_line(error.strerror or error)
         found = "a photo" if is_image(path) else f"{kind_of(path)} ({reason})"
@@ -258,8 +258,7 @@ def _sixteen_bits(raw: VideoFrame, width: int, height: int, how: str) -> UInt16[
 
 def _values(plane: VideoPlane) -> UInt16[Array, "h w"]:
     rows = np.frombuffer(memoryview(plane), "<u2").reshape(plane.height, plane.line_size // 2)
-    values: Array = rows[:, : plane.width].astype(np.uint16, copy=False)
-    return values
+    return rows[:, : plane.width].astype(np.uint16, copy=False)
 
 
 def _rate(stream: VideoStream) -> float:

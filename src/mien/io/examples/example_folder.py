@@ -265,8 +265,7 @@ def _drawn(subregions: Subregions) -> UInt8[Array, "h w 4"]:
     colours = 128 + 100 * np.cos(turn[:, None] + np.array([0, 2.1, 4.2]))
     total = subregions.fades.sum(axis=2, keepdims=True)
     mixed = subregions.fades @ colours.astype(np.float32) / np.maximum(total, 1e-6)
-    drawn: Array = np.dstack([mixed, 255 * np.minimum(total, 1)]).round().astype(np.uint8)
-    return drawn
+    return np.dstack([mixed, 255 * np.minimum(total, 1)]).round().astype(np.uint8)
 
 
 def _write_png(path: Path, pixels: UInt8[Array, "h w c"]) -> None:

@@ -58,5 +58,4 @@ def _at_vertices(mesh: Mesh, picture: UInt8[Array, "h w 3"]) -> Float[Array, " v
     at = cv2.remap(grey, x[None], y[None], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
     corners, values = mesh.triangles.ravel(), at[mesh.uv_triangles.ravel()]
     count = np.maximum(np.bincount(corners, minlength=len(mesh.vertices)), 1)
-    mean: Array = np.bincount(corners, values, minlength=len(mesh.vertices)) / count
-    return mean
+    return np.bincount(corners, values, minlength=len(mesh.vertices)) / count

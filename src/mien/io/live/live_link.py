@@ -161,5 +161,4 @@ def _eye_angles(weights: Mapping[str, float]) -> Array:
         yaw = weights[f"eyeLook{to_right}{side}"] - weights[f"eyeLook{to_left}{side}"]
         pitch = weights[f"eyeLookDown{side}"] - weights[f"eyeLookUp{side}"]
         angles += [yaw, pitch, 0.0]
-    scaled: Array = LOOK_RANGE * np.array(angles)
-    return scaled
+    return LOOK_RANGE * np.array(angles)

@@ -76,8 +76,7 @@ def _bones(moment: Moment) -> Iterator[_Message]:
 def _eye_rotation(gaze: Gaze) -> Array:
     from scipy.spatial.transform import Rotation
 
-    matrix: Array = Rotation.from_euler("YX", [gaze.yaw, -gaze.pitch]).as_matrix()
-    return matrix
+    return Rotation.from_euler("YX", [gaze.yaw, -gaze.pitch]).as_matrix()
 
 
 def _blends(moment: Moment, given: Mapping[str, float]) -> Iterator[_Message]:

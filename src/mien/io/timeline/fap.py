@@ -139,8 +139,7 @@ class FapMeter:
             yaw, pitch, roll = head_angles(check_rotation("rotation", rotation), order="YXZ")
             head = [HEAD_YAW, HEAD_PITCH, HEAD_ROLL]
             values[head] = np.array([yaw, pitch, roll]) / ANGLE_UNIT
-        read: Array = np.round(values[1:]).astype(np.int64)
-        return read
+        return np.round(values[1:]).astype(np.int64)
 
 
 def write_fap(
@@ -185,8 +184,7 @@ def write_fap(
 def _position(vertices: Array, points: tuple[str, ...]) -> Float[Array, " 3"]:
     """The mean of some points; what holds for vertices holds for displacements."""
     weights = [_weights(point) for point in points]
-    position: Array = np.mean([w @ vertices[list(v)] for v, w in weights], axis=0)
-    return position
+    return np.mean([w @ vertices[list(v)] for v, w in weights], axis=0)
 
 
 @cache
@@ -209,13 +207,11 @@ def _weights(point: str) -> tuple[tuple[int, ...], Array]:
 @cache
 def _part(name: str) -> Int[Array, " n"]:
     mesh = load_generic_head().mesh
-    vertices: Array = np.unique(mesh.triangles[mesh.part == mesh.part_names.index(name)])
-    return vertices
+    return np.unique(mesh.triangles[mesh.part == mesh.part_names.index(name)])
 
 
 def _eyeball(vertices: Array, name: str) -> Float[Array, "n 3"]:
-    found: Array = vertices[_part(name)]
-    return found
+    return vertices[_part(name)]
 
 
 def _turn(at_rest: Array, now: Array) -> Float[Array, "3 3"]:
@@ -223,8 +219,7 @@ def _turn(at_rest: Array, now: Array) -> Float[Array, "3 3"]:
     from scipy.spatial.transform import Rotation
 
     centred = (now - now.mean(axis=0), at_rest - at_rest.mean(axis=0))
-    rotation: Array = Rotation.align_vectors(*centred)[0].as_matrix()
-    return rotation
+    return Rotation.align_vectors(*centred)[0].as_matrix()
 
 
 def _check_vertices(name: str, vertices: object) -> Float[Array, "v 3"]:

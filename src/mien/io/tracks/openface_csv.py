@@ -120,8 +120,7 @@ def pose_angles(R_cam_head: Float[Array, "3 3"]) -> Float[Array, " 3"]:
     """
     from scipy.spatial.transform import Rotation
 
-    angles: Array = Rotation.from_matrix(R_cam_head @ FACING).as_euler("XYZ")
-    return angles
+    return Rotation.from_matrix(R_cam_head @ FACING).as_euler("XYZ")
 
 
 def gaze_vectors(
@@ -138,8 +137,7 @@ def gaze_vectors(
         yaw = gaze.yaw + LOOK_RANGE * (looks[to_left] - looks[to_right])
         pitch = gaze.pitch + LOOK_RANGE * (looks["Up"] - looks["Down"])
         directions.append([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
-    vectors: Array = np.array(directions) @ R_cam_head.T
-    return vectors
+    return np.array(directions) @ R_cam_head.T
 
 
 def _header_cells(frame: TrackedFrame) -> list[str]:

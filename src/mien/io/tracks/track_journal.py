@@ -225,8 +225,7 @@ def _state_to_json(state: TrackState) -> Json:
 
 
 def _numbers(array: Array) -> list[float]:
-    numbers: list[float] = np.asarray(array, dtype=np.float64).ravel().tolist()
-    return numbers
+    return np.asarray(array, dtype=np.float64).ravel().tolist()
 
 
 def _frame(

@@ -43,8 +43,7 @@ def normalize_contrast(
     centered -= blurred(centered) / share * inside
     # The running sums of a box filter can come out a hair below zero.
     variance = np.maximum(blurred(centered * centered), 0) / share
-    normalized: Array = centered / (np.sqrt(variance) + _NOISE_FLOOR)
-    return normalized
+    return centered / (np.sqrt(variance) + _NOISE_FLOOR)
 
 
 def match_images(
@@ -59,8 +58,7 @@ def match_images(
         fine: of waves 18 px long half the height is found instead of a quarter, at twice the noise:
             for those who average.
     """
-    flow: Array = _searcher(fine).calc(_eight_bit(a), _eight_bit(b), None)
-    return flow
+    return _searcher(fine).calc(_eight_bit(a), _eight_bit(b), None)
 
 
 def local_correlation(
@@ -72,14 +70,12 @@ def local_correlation(
     side = 2 * round(2 * radius_px) + 1
 
     def mean(values: Array) -> Array:
-        blurred: Array = cv2.blur(values, (side, side))
-        return blurred
+        return cv2.blur(values, (side, side))
 
     mean_a, mean_b = mean(a), mean(b)
     covariance = mean(a * b) - mean_a * mean_b
     variances = (mean(a * a) - mean_a * mean_a) * (mean(b * b) - mean_b * mean_b)
-    correlation: Array = covariance / np.sqrt(np.maximum(variances, 1e-6))
-    return correlation
+    return covariance / np.sqrt(np.maximum(variances, 1e-6))
 
 
 def _eight_bit(image: Array) -> Array:

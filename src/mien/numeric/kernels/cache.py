@@ -126,8 +126,7 @@ class KernelFiles:
         return self.folder / f"{self.base}.nbi"
 
     def _load_index(self) -> dict[Any, str]:
-        found: dict[Any, str] = self._read(self._index) or {}
-        return found
+        return self._read(self._index) or {}
 
     def _left_behind(self) -> Iterator[Path]:
         """Files of processes that died, and those that no index names any more."""

@@ -36,8 +36,7 @@ class Raster:
     @property
     def mask(self) -> Array:
         """(H, W) bool: where there is a triangle."""
-        inside: Array = self.triangle_ids >= 0
-        return inside
+        return self.triangle_ids >= 0
 
 
 def rasterize(

@@ -46,5 +46,4 @@ class Anderson:
         normal = change.T @ change + self.regularization * np.eye(change.shape[1])
         mixing = np.linalg.solve(normal, change.T @ steps[:, -1])
         mixing = mixing / np.where(scale > 0, scale, 1.0)
-        proposal: Array = image - np.diff(images, axis=1) @ mixing
-        return proposal
+        return image - np.diff(images, axis=1) @ mixing

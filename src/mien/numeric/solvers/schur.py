@@ -85,16 +85,14 @@ class BlockSystem:
     def open_blocks(self) -> Bool[Array, " n"]:
         """Which blocks the data do not determine even if the common unknowns were known."""
         strengths = np.linalg.eigvalsh(self.blocks)
-        is_open: Array = strengths[:, 0] <= _OPEN * strengths[:, -1]
-        return is_open
+        return strengths[:, 0] <= _OPEN * strengths[:, -1]
 
 
 def _diagonal(matrices: Array) -> Array:
     """The diagonals, with a floor that keeps unknowns without data where they are."""
     diagonal: Array = np.einsum("...ii->...i", matrices)
     floor = max(1e-12 * float(diagonal.max(initial=0.0)), 1e-300)
-    floored: Array = np.maximum(diagonal, floor)
-    return floored
+    return np.maximum(diagonal, floor)
 
 
 def _reduced(common: Array, inverse: Array, coupling: Array) -> tuple[Array, Array]:
@@ -127,5 +125,4 @@ def _inverse(matrix: Array) -> Array:
     scaled = matrix * np.outer(scale, scale)
     if np.linalg.cond(scaled) > 1e15:
         raise EstimationError("some unknowns are not determined by the data")
-    inverse: Array = np.linalg.inv(scaled) * np.outer(scale, scale)
-    return inverse
+    return np.linalg.inv(scaled) * np.outer(scale, scale)

@@ -81,8 +81,7 @@ def _solved(quadratic: Array, linear: Array, slack: float) -> Float[Array, " m"]
     # An interior point keeps off the bounds by its accuracy.
     above = np.maximum(shares + slack, 0.0)
     above[above < 1e-9] = 0.0
-    result: Array = above * ((1.0 + count * slack) / above.sum()) - slack
-    return result
+    return above * ((1.0 + count * slack) / above.sum()) - slack
 
 
 def _interior(quadratic: Array, linear: Array, slack: float) -> Float[Array, " m"]:

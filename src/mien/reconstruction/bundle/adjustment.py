@@ -214,13 +214,11 @@ def _groups(group: Array | None, photos: int) -> Int[Array, " k"]:
     if group is None:
         return np.arange(photos)
     names = check_array("focal_group", group, (photos,), dtype=np.int64)
-    groups: Array = np.unique(names, return_inverse=True)[1].reshape(photos)
-    return groups
+    return np.unique(names, return_inverse=True)[1].reshape(photos)
 
 
 def _group_means(values: Array, groups: Int[Array, " k"]) -> Float[Array, " g"]:
-    means: Array = np.bincount(groups, values) / np.bincount(groups)
-    return means
+    return np.bincount(groups, values) / np.bincount(groups)
 
 
 def _focal_prior(

@@ -95,8 +95,7 @@ def bundle_residuals(bundle: Bundle, data: BundleData) -> Float[Array, "k n 2"]:
     in_camera = bundle.points @ np.swapaxes(bundle.R, 1, 2) + bundle.t[:, None]
     focal = np.exp(bundle.log_focal)[data.group][:, None, None]
     projected = focal * in_camera[..., :2] / in_camera[..., 2:]
-    residuals: Array = data.precision[..., None] * (projected - data.image)
-    return residuals
+    return data.precision[..., None] * (projected - data.image)
 
 
 def bundle_cost(bundle: Bundle, data: BundleData) -> float:
@@ -190,15 +189,13 @@ def similarity_constraints(
     rows = np.concatenate(
         [np.tile(np.eye(3), (len(points), 1, 1)), cross_matrix(spread), spread[:, None]], axis=1
     )
-    held: Array = rows * counts[:, None, None]
-    return held
+    return rows * counts[:, None, None]
 
 
 def _columns(photo: int, photos: int, group: Int[Array, " k"]) -> Int[Array, " 7"]:
     """Places of a photo's seven unknowns in the common step."""
     pose = POSE_SIZE * photo + np.arange(POSE_SIZE)
-    columns: Array = np.append(pose, POSE_SIZE * photos + group[photo])
-    return columns
+    return np.append(pose, POSE_SIZE * photos + group[photo])
 
 
 def _evidence(bundle: Bundle, data: BundleData) -> tuple[float, Float[Array, "k 7"]]:
@@ -212,14 +209,12 @@ def _evidence(bundle: Bundle, data: BundleData) -> tuple[float, Float[Array, "k 
 
 
 def _focal_residuals(bundle: Bundle, data: BundleData) -> Float[Array, " g"]:
-    residuals: Array = data.log_focal_precision * (bundle.log_focal - data.log_focal_mean)
-    return residuals
+    return data.log_focal_precision * (bundle.log_focal - data.log_focal_mean)
 
 
 def _shape_residuals(bundle: Bundle, shape: ShapePrior) -> Float[Array, "n 3"]:
     believed = shape.mean + np.tensordot(bundle.coefficients, shape.components, 1)
-    residuals: Array = (bundle.points - believed) / shape.sigma[:, None]
-    return residuals
+    return (bundle.points - believed) / shape.sigma[:, None]
 
 
 def _add_priors(system: BlockSystem, bundle: Bundle, data: BundleData) -> None:

@@ -40,8 +40,7 @@ class Crop:
 
     def to_photo(self, places: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
         """Px of this image to px of the photo."""
-        in_photo: Array = places / self.scale + self.corner
-        return in_photo
+        return places / self.scale + self.corner
 
 
 def visible_mesh(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Mesh:

@@ -89,5 +89,4 @@ def _lifted(
     away = lids - seat
     length = np.linalg.norm(away, axis=1)
     least = radius + np.minimum(gap / 2, _OPENING_MM)
-    lifted: Array = seat + away * (np.maximum(length, least) / length)[:, None]
-    return lifted
+    return seat + away * (np.maximum(length, least) / length)[:, None]

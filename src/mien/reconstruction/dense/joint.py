@@ -83,8 +83,7 @@ class JointSolution:
     def off_sigmas(self) -> Float[Array, " m"]:
         """(M,) length of each residual over its sigma."""
         residuals = misfit_at(self.problem, self.state).residuals
-        off: Array = np.linalg.norm(residuals, axis=1) / self.problem.seen.sigma_px
-        return off
+        return np.linalg.norm(residuals, axis=1) / self.problem.seen.sigma_px
 
     @cached_property
     def covariance(self) -> Float[Array, "q q"]:

@@ -50,8 +50,7 @@ class JointProblem:
     def deviations(self, state: JointState) -> Float[Array, "n 3"]:
         """(N, 3) mm: d, what the components do not explain."""
         explained = self.prior.mean + (self.basis @ state.coefficients).reshape(-1, 3)
-        off: Array = state.places - explained
-        return off
+        return state.places - explained
 
 
 def matching_noise(off_sigmas: Float[Array, " m"]) -> float:
@@ -174,5 +173,4 @@ def flat(blocks: Float[Array, "n 3 a"]) -> Float[Array, "n*3 a"]:
 
 def apply_each(matrices: Float[Array, "n a b"], vectors: Float[Array, "n b"]) -> Array:
     """(N, A): every matrix times its vector."""
-    applied: Array = (matrices @ vectors[..., None])[..., 0]
-    return applied
+    return (matrices @ vectors[..., None])[..., 0]

@@ -160,8 +160,7 @@ def _centres(image: Shaped[Array, "h w"]) -> Float[Array, "h w 2"]:
 
 
 def _dot(a: Float[Array, "h w 3"], b: Float[Array, "h w 3"]) -> Float[Array, "h w"]:
-    product: Array = np.einsum("hwi,hwi->hw", a, b)
-    return product
+    return np.einsum("hwi,hwi->hw", a, b)
 
 
 def _sample(
@@ -170,7 +169,7 @@ def _sample(
     """Values at places in px, 0 outside of the image; `how` is one of OpenCV's interpolations."""
     import cv2
 
-    found: Array = cv2.remap(
+    return cv2.remap(
         np.asarray(values, np.float32),
         places.astype(np.float32) - np.float32(0.5),
         None,
@@ -178,4 +177,3 @@ def _sample(
         borderMode=cv2.BORDER_CONSTANT,
         borderValue=0,
     )
-    return found

@@ -39,8 +39,7 @@ class HeadPrior:
 
     def vertices(self, coefficients: Float[Array, " c"]) -> Float[Array, "v 3"]:
         """(V, 3) mm of the head with these coefficients."""
-        moved: Array = self.mean + np.tensordot(coefficients, self.components, 1)
-        return moved
+        return self.mean + np.tensordot(coefficients, self.components, 1)
 
 
 @cache
@@ -91,8 +90,7 @@ def _without_similarities(
     shares = np.linalg.lstsq(held, (components * face).reshape(len(components), -1).T, rcond=None)[
         0
     ]
-    free: Array = components - np.tensordot(shares.T, fields, 1)
-    return free
+    return components - np.tensordot(shares.T, fields, 1)
 
 
 def _spatial_modes(generic: GenericHead, sign: int) -> Float[Array, "m v"]:
@@ -104,11 +102,9 @@ def _spatial_modes(generic: GenericHead, sign: int) -> Float[Array, "m v"]:
     def kernel(places: Array) -> Array:
         def value(to: Array) -> Array:
             squared = (places**2).sum(1)[:, None] + (to**2).sum(1) - 2 * places @ to.T
-            near: Array = np.exp(-np.maximum(squared, 0) / (2 * LENGTH_MM**2))
-            return near
+            return np.exp(-np.maximum(squared, 0) / (2 * LENGTH_MM**2))
 
-        both: Array = (value(centres) + sign * value(centres * mirror)) / 2
-        return both
+        return (value(centres) + sign * value(centres * mirror)) / 2
 
     values, vectors = np.linalg.eigh(kernel(centres))
     chosen = np.argsort(values)[::-1][:MODES]

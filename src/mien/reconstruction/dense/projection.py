@@ -93,5 +93,4 @@ def _cross(a: Float[Array, "m 3"], b: Float[Array, "m 3"]) -> Float[Array, "m 3"
     # Much faster than np.cross on so many short vectors.
     ax, ay, az = a.T
     bx, by, bz = b.T
-    product: Array = np.column_stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
-    return product
+    return np.column_stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

@@ -119,8 +119,7 @@ def sample_heights(
     count = len(weights)
     data = spread.T @ (np.sqrt(weights)[:, None] * rng.normal(size=(count, draws)))
     bending = surface.root.T @ rng.normal(size=(surface.root.shape[0], draws))
-    heights: Array = splu(matrix).solve(np.asarray(data + bending)).T
-    return heights
+    return splu(matrix).solve(np.asarray(data + bending)).T
 
 
 def _solve_heights(

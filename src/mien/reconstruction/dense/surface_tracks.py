@@ -49,8 +49,7 @@ class Tracks:
 
     def on(self, values: Float[Array, "... v c"]) -> Float[Array, "... n c"]:
         """Per-vertex values at the places."""
-        at: Array = np.einsum("nc,...ncd->...nd", self.barycentrics, values[..., self.corners, :])
-        return at
+        return np.einsum("nc,...ncd->...nd", self.barycentrics, values[..., self.corners, :])
 
     def of(self, keep: Bool[Array, " n"]) -> Tracks:
         """Some of the places."""

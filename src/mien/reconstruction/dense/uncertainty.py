@@ -40,8 +40,7 @@ def vertex_deviation(
     # Where the surface is measured, so is what the modes leave out.
     unmeasured = across / ACROSS_SD_MM**2
     variance = of_coefficients + across + unmeasured * _left_out(prior) + ALONG_SD_MM**2
-    deviation: Array = np.sqrt(variance)
-    return deviation
+    return np.sqrt(variance)
 
 
 def _spread(covariance: Float[Array, "c c"], components: Float[Array, "c v 3"]) -> Array:
@@ -49,8 +48,7 @@ def _spread(covariance: Float[Array, "c c"], components: Float[Array, "c v 3"]) 
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0))
     fields = np.tensordot(root.T, components, 1)
-    spread: Array = (fields**2).sum(axis=(0, 2))
-    return spread
+    return (fields**2).sum(axis=(0, 2))
 
 
 def _left_out(prior: HeadPrior) -> Float[Array, " v"]:
@@ -58,5 +56,4 @@ def _left_out(prior: HeadPrior) -> Float[Array, " v"]:
     smooth = prior.components[prior.identity_count :]
     expressed = (smooth**2).sum(axis=(0, 2))
     whole = 3 * (SYMMETRIC_SD_MM**2 + ASYMMETRIC_SD_MM**2)
-    missing: Array = np.maximum(whole - expressed, 0)
-    return missing
+    return np.maximum(whole - expressed, 0)

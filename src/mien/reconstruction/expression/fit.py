@@ -219,8 +219,7 @@ def _with_skin(
 def _held(generic: GenericHead) -> Float[Array, " v"]:
     """(V,) in [0, 1]: hair and ears stay."""
     still = sum(generic.regions[name] for name in ("scalp", "left_ear", "right_ear"))
-    held: Array = np.minimum(np.asarray(still), 1.0)
-    return held
+    return np.minimum(np.asarray(still), 1.0)
 
 
 def _gaze(views: Sequence[View], found: Explained, known: KnownHead) -> Float[Array, "2 2"]:
@@ -240,5 +239,4 @@ def _gaze(views: Sequence[View], found: Explained, known: KnownHead) -> Float[Ar
         return np.zeros((2, 2))
     blinks = [generic.unit_names.index(f"eyeBlink{side}") for side in ("Left", "Right")]
     seen = found.weights[blinks] < _CLOSED
-    turned: Array = np.clip(now - rest, -MOST_RAD, MOST_RAD) * seen[:, None]
-    return turned
+    return np.clip(now - rest, -MOST_RAD, MOST_RAD) * seen[:, None]

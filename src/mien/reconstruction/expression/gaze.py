@@ -58,8 +58,7 @@ def direction_to_iris(
     off = towards - along * ray
     reach = np.sqrt(max(radius**2 - float(off @ off), 0.0))
     to_iris = (along - reach) * ray - towards
-    direction: Array = to_iris / np.linalg.norm(to_iris)
-    return direction
+    return to_iris / np.linalg.norm(to_iris)
 
 
 def yaw_pitch_of(directions: Float[Array, "n 3"]) -> Float[Array, "n 2"]:

@@ -81,8 +81,7 @@ def _steady(generic: GenericHead) -> Bool[Array, " v"]:
     """(V,) skin that goes with the head: the neck turns by itself, hair has no surface."""
     regions = generic.regions
     apart = regions["neck"] + regions["scalp"] + regions["left_ear"] + regions["right_ear"]
-    steady: Array = (regions["face"] > 0) & (apart < 0.5) & (regions["eye_socket"] < 1)
-    return steady
+    return (regions["face"] > 0) & (apart < 0.5) & (regions["eye_socket"] < 1)
 
 
 def _nearest(camera: Camera, known: KnownHead) -> int:

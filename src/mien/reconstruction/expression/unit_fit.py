@@ -35,8 +35,7 @@ class Explained:
 
     def vertices(self, known: KnownHead) -> Float[Array, "v 3"]:
         """(V, 3) mm: the head as the units have it."""
-        moved: Array = known.vertices + np.tensordot(self.weights, known.units, axes=1)
-        return moved
+        return known.vertices + np.tensordot(self.weights, known.units, axes=1)
 
 
 def explain(

@@ -72,8 +72,7 @@ def _eroded(mask: Bool[Array, "h w"]) -> Bool[Array, "h w"]:
     import cv2
 
     kernel = np.ones((_EROSION_PX, _EROSION_PX), np.uint8)
-    eroded: Array = cv2.erode(mask.astype(np.uint8), kernel) > 0
-    return eroded
+    return cv2.erode(mask.astype(np.uint8), kernel) > 0
 
 
 def _camera_at(gallery: Gallery, yaw: float) -> Camera:

@@ -103,8 +103,7 @@ class Gallery:
 
         def side(seen_from: Camera) -> Float[Array, " 3"]:
             line = seen_from.center - self.center
-            unit: Array = line / np.linalg.norm(line)
-            return unit
+            return line / np.linalg.norm(line)
 
         here = side(camera)
         ordered = sorted(self._photos, key=lambda photo: -float(side(photo.camera) @ here))

@@ -64,5 +64,4 @@ def match_keypoints(a: Keypoints, b: Keypoints) -> Int[Array, "m 2"]:
 
 def _distance(likeness: Float[Array, " n"]) -> Float[Array, " n"]:
     """Between unit vectors of this scalar product."""
-    distance: Array = np.sqrt(np.maximum(2 - 2 * likeness, 0))
-    return distance
+    return np.sqrt(np.maximum(2 - 2 * likeness, 0))

@@ -144,13 +144,9 @@ def _reversed(rotation: Array, weights: Array, points: Array) -> Float[Array, "3
     """The rotation whose flat image of the points' main plane is the same (Necker reversal)."""
     seen = points[weights > 0]
     normal = np.linalg.svd(seen - seen.mean(axis=0), full_matrices=False)[2][2]
-    reversed_: Array = (
-        np.diag([1.0, 1.0, -1.0]) @ rotation @ (np.eye(3) - 2 * np.outer(normal, normal))
-    )
-    return reversed_
+    return np.diag([1.0, 1.0, -1.0]) @ rotation @ (np.eye(3) - 2 * np.outer(normal, normal))
 
 
 def _rms(poses: Poses, points: Array, image: Array, weights: Array) -> Float[Array, " k"]:
     squared = ((reprojection(poses, points) - image) ** 2).sum(axis=-1)
-    rms: Array = np.sqrt((weights * squared).sum(axis=1) / weights.sum(axis=1))
-    return rms
+    return np.sqrt((weights * squared).sum(axis=1) / weights.sum(axis=1))

@@ -78,8 +78,7 @@ def reprojection(poses: Poses, points: Float[Array, "n 3"]) -> Float[Array, "k n
     """(K, N, 2) px relative to the principal points. Source: [Pighin 2002] below eq. (1)."""
     rotated = _rotated(poses, points)
     above = poses.s[:, None, None] * (rotated[..., :2] + poses.t[:, None])
-    projected: Array = above / _depth(poses, rotated)[..., None]
-    return projected
+    return above / _depth(poses, rotated)[..., None]
 
 
 def step_scale(poses: Poses, points: Array, image: Array, weights: Array) -> Poses:
@@ -109,8 +108,7 @@ def step_points(
     pull = pull * (np.trace(normal, axis1=1, axis2=2) + 1e-12)
     right -= np.einsum("ncd,nd->nc", normal, anchor)
     normal[:, range(3), range(3)] += pull[:, None]
-    moved: Array = anchor + np.linalg.solve(normal, right[..., None])[..., 0]
-    return moved
+    return anchor + np.linalg.solve(normal, right[..., None])[..., 0]
 
 
 def step_rotation(poses: Poses, points: Array, image: Array, weights: Array) -> Poses:
@@ -161,14 +159,12 @@ def bounded_eta(eta: Float[Array, " k"]) -> Float[Array, " k"]:
 
 
 def _rotated(poses: Poses, points: Array) -> Float[Array, "k n 3"]:
-    rotated: Array = points @ np.swapaxes(poses.R, 1, 2)
-    return rotated
+    return points @ np.swapaxes(poses.R, 1, 2)
 
 
 def _depth(poses: Poses, rotated: Array) -> Float[Array, "k n"]:
     """Depth over t_z, 1 / w of eq. (2)."""
-    depth: Array = np.maximum(1 + poses.eta[:, None] * rotated[..., 2], _LEAST_DEPTH)
-    return depth
+    return np.maximum(1 + poses.eta[:, None] * rotated[..., 2], _LEAST_DEPTH)
 
 
 def _rotated_and_w(poses: Poses, points: Array, weights: Array) -> tuple[Array, Array]:

@@ -92,14 +92,12 @@ def check_problem(
 def residual_lengths(problem: PoseProblem, solution: Alternation) -> Float[Array, "k n"]:
     """Reprojection errors in px; meaningless where unseen."""
     off = reprojection(solution.poses, solution.points) - problem.image
-    lengths: Array = np.linalg.norm(off, axis=-1)
-    return lengths
+    return np.linalg.norm(off, axis=-1)
 
 
 def weighted_lengths(problem: PoseProblem, solution: Alternation) -> Float[Array, "k n"]:
     """Reprojection errors as they would be with the median observation's variance, px."""
-    weighted: Array = np.sqrt(problem.weights) * residual_lengths(problem, solution)
-    return weighted
+    return np.sqrt(problem.weights) * residual_lengths(problem, solution)
 
 
 def joint_sigma(
@@ -126,8 +124,7 @@ def moved_too_far(
     move = estimate_similarity(solution.points[told], problem.points[told])
     moved = np.linalg.norm(move(solution.points) - problem.points, axis=1)
     limit = max(_MOVED_SIGMAS * robust_sigma(moved[told], 3), _LEAST_LIMIT_MM)
-    far: Array = told & (moved > limit)
-    return far
+    return told & (moved > limit)
 
 
 def rms_per_photo(
@@ -145,5 +142,4 @@ def rms_per_photo(
     squared = np.where(trusted, residual_lengths(problem, solution) ** 2, 0.0)
     if weighted:
         squared *= problem.weights / max(float(problem.weights.max()), np.finfo(float).tiny)
-    rms: Array = np.sqrt(squared.sum(axis=1) / np.maximum(trusted.sum(axis=1), 1))
-    return rms
+    return np.sqrt(squared.sum(axis=1) / np.maximum(trusted.sum(axis=1), 1))

@@ -106,5 +106,4 @@ def vertex_uncertainty(
     distance, nearest = cKDTree(places).query(vertices)
     share = np.exp(-((distance / reach_mm) ** 2))
     known = np.minimum(deviation_mm[nearest], prior_mm)
-    uncertainty: Array = np.sqrt(share * known**2 + (1 - share) * prior_mm**2)
-    return uncertainty
+    return np.sqrt(share * known**2 + (1 - share) * prior_mm**2)

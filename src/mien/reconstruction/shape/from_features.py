@@ -78,5 +78,4 @@ def estimate_identity(
     offsets = (points - features.on(generic.mesh.vertices)).ravel()
     precision = IDENTITY_SIGMA_MM**-2
     normal = precision * components @ components.T + np.eye(len(components))
-    coefficients: Array = np.linalg.solve(normal, precision * components @ offsets)
-    return coefficients
+    return np.linalg.solve(normal, precision * components @ offsets)

@@ -65,8 +65,7 @@ def _solve(matrix: Any, right: Float[Array, " n"]) -> Float[Array, " n"]:
 
     symmetric = {"SymmetricMode": True}
     factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
-    solution: Array = factors.solve(right)
-    return solution
+    return factors.solve(right)
 
 
 def _normal_equations(

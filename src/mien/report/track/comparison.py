@@ -46,8 +46,7 @@ class DrawnFace:
         frame = np.ascontiguousarray(_check_size("pixels", pixels, self.inside))
         share = _softened(self.inside)
         colours = np.ascontiguousarray(self.picture[..., :3])
-        over: Array = cv2.blendLinear(colours, frame, share, 1 - share)
-        return over
+        return cv2.blendLinear(colours, frame, share, 1 - share)
 
 
 def draw_tracked(
@@ -98,8 +97,7 @@ def face_pixels(mesh: Mesh, camera: Camera) -> Bool[Array, "h w"]:
     """
     shown = mesh.triangles_of(*shown_parts(mesh))
     ids = rasterize_mesh(mesh.submesh(shown), camera).triangle_ids
-    inside: Array = _face_triangles()[shown][ids] & (ids >= 0)
-    return inside
+    return _face_triangles()[shown][ids] & (ids >= 0)
 
 
 @cache
@@ -118,8 +116,7 @@ def _matched(drawn: UInt8[Array, "h w 4"], found: TrackedFrame) -> UInt8[Array, 
     levels = np.arange(256.0)[:, None]
     colours = np.clip(np.rint(levels * found.gain + found.bias), 0, 255)
     table = np.concatenate([colours, levels], axis=1).astype(np.uint8)
-    matched: Array = cv2.LUT(drawn, table[None])
-    return matched
+    return cv2.LUT(drawn, table[None])
 
 
 def _softened(inside: Bool[Array, "h w"]) -> Float[Array, "h w"]:
@@ -131,8 +128,7 @@ def _softened(inside: Bool[Array, "h w"]) -> Float[Array, "h w"]:
     across = 2 * round(sigma) + 1
     for _ in range(2):
         mask = cv2.blur(mask, (across, across))
-    soft: Array = np.clip(2 * mask - 1, 0, 1) * inside
-    return soft
+    return np.clip(2 * mask - 1, 0, 1) * inside
 
 
 def _check_size(name: str, image: object, mask: Bool[Array, "h w"]) -> UInt8[Array, "h w 3"]:

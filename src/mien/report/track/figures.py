@@ -178,5 +178,4 @@ def _anew(series: Series) -> Bool[Array, " n"]:
 def _alone(finite: Bool[Array, " n"]) -> Bool[Array, " n"]:
     """What no line shows: numbers with none beside them."""
     beside = np.pad(finite, 1)
-    alone: Array = finite & ~beside[:-2] & ~beside[2:]
-    return alone
+    return finite & ~beside[:-2] & ~beside[2:]

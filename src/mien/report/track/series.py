@@ -90,8 +90,7 @@ def rotation_errors(series: Series, truth: Series) -> Float[Array, " n"]:
 def translation_errors(series: Series, truth: Series) -> Float[Array, " n"]:
     """(N,) distance between the translations, percent of the true distance."""
     apart = np.linalg.norm(series.translations - truth.translations, axis=1)
-    errors: Array = 100 * apart / np.linalg.norm(truth.translations, axis=1)
-    return errors
+    return 100 * apart / np.linalg.norm(truth.translations, axis=1)
 
 
 def quaternions(series: Series) -> Float[Array, "n 4"]:

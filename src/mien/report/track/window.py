@@ -58,8 +58,7 @@ class Window:
         part = pixels[top:bottom, left:right]
         smaller = self.size[0] < part.shape[1]
         kind = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
-        shown: Array = cv2.resize(part, self.size, interpolation=kind)
-        return shown
+        return cv2.resize(part, self.size, interpolation=kind)
 
 
 def window_of(track: Track, head: Head, limits: tuple[int, int]) -> Window:

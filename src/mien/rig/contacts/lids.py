@@ -111,8 +111,7 @@ class Lids:
 
     def places(self, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
         """(L, 3) longitude and latitude, radians, and radius of the lids on the unit sphere."""
-        places: Array = places_of((vertices[self.vertices] - self.eyeball.centre) @ self.to_sphere)
-        return places
+        return places_of((vertices[self.vertices] - self.eyeball.centre) @ self.to_sphere)
 
     def at(self, places: Float[Array, "l 3"]) -> Float[Array, "l 3"]:
         """(L, 3) mm: the inverse of places."""
@@ -124,13 +123,11 @@ class Lids:
                 np.sin(latitude),
             ]
         )
-        result: Array = (radius[:, None] * points) @ self.from_sphere + self.eyeball.centre
-        return result
+        return (radius[:, None] * points) @ self.from_sphere + self.eyeball.centre
 
     def overlap(self, places: Float[Array, "l 3"]) -> Float[Array, " u"]:
         """(U,) radians by which the upper edge's vertices lie below the lower edge."""
-        found: Array = edge_overlap(*self.edges(places))
-        return found
+        return edge_overlap(*self.edges(places))
 
     def edges(self, places: Float[Array, "l 3"]) -> tuple[Array, Array]:
         """The upper and the lower edge's places, from the inner to the outer corner."""
@@ -189,8 +186,7 @@ def _closing(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
     places[:, 1] += lids.spread(places, down) * lids.on_upper
     off = off_lower(*lids.edges(places), lids.in_front)
     places[:, 2] += lids.spread(places, off) * lids.on_upper
-    moved: Array = lids.at(places) - lids.at(before)
-    return moved
+    return lids.at(places) - lids.at(before)
 
 
 def _lift(lids: Lids, places: Float[Array, "l 3"]) -> Float[Array, "l 3"]:

@@ -219,8 +219,7 @@ def _ways_out(
 def _around(lip: Lip, ways: Float[Array, "t 3"]) -> Int[Array, " n"]:
     """The tested vertices that go along with those that give way."""
     hit = ways.any(axis=1)
-    near: Array = np.flatnonzero(lip.spread[np.ix_(lip.tested, hit)].any(axis=1))
-    return near
+    return np.flatnonzero(lip.spread[np.ix_(lip.tested, hit)].any(axis=1))
 
 
 def _spread(lip: Lip, ways: Float[Array, "t 3"]) -> Float[Array, "p 3"]:
@@ -231,5 +230,4 @@ def _spread(lip: Lip, ways: Float[Array, "t 3"]) -> Float[Array, "p 3"]:
     near = lip.spread[:, chosen]
     most = near.max(axis=1)
     share = most / np.maximum(near.sum(axis=1), 1e-12)
-    moved: Array = (near @ ways[chosen]) * share[:, None]
-    return moved
+    return (near @ ways[chosen]) * share[:, None]

@@ -48,8 +48,7 @@ def distances_from(
 def fading(distance: Float[Array, " n"], reach: float) -> Float[Array, " n"]:
     """1 at distance 0, 0 from `reach` on, with no kink at either end."""
     share = np.clip(distance / reach, 0.0, 1.0)
-    faded: Array = 0.5 + 0.5 * np.cos(np.pi * share)
-    return faded
+    return 0.5 + 0.5 * np.cos(np.pi * share)
 
 
 def behind(edges: csr_matrix, margin: Int[Array, " n"], front: int) -> Int[Array, " v"]:
@@ -58,5 +57,4 @@ def behind(edges: csr_matrix, margin: Int[Array, " n"], front: int) -> Int[Array
 
     kept = np.setdiff1d(np.arange(edges.shape[0]), margin)
     _, label = connected_components(edges[kept][:, kept], directed=False)
-    unreached: Array = kept[label != label[kept == front]]
-    return unreached
+    return kept[label != label[kept == front]]

@@ -78,5 +78,4 @@ def _looked_up(
     upper = np.minimum(lower + 1, len(softer) - 1)
     mixed = softer[lower, place]
     mixed += share * (softer[upper, place] - mixed)
-    colours: Array = np.rint(mixed).clip(0, 255).astype(np.uint8)
-    return colours
+    return np.rint(mixed).clip(0, 255).astype(np.uint8)

@@ -173,5 +173,4 @@ def _looked_up(image: Float[Array, "h w"], places: Float[Array, "*batch 2"]) -> 
 
     flat = (places.reshape(len(places), -1, 2) - 0.5).astype(np.float32)
     found = cv2.remap(image, flat, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    values: Array = found.reshape(places.shape[:-1])
-    return values
+    return found.reshape(places.shape[:-1])

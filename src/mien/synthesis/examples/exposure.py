@@ -70,5 +70,4 @@ def _gain(face: UInt8[Array, "p 3"], first: UInt8[Array, "p 3"]) -> Float[Array,
     usable = (both >= _DARKEST).all(axis=1) & (both <= _BRIGHTEST).all(axis=1)
     if not usable.any():
         return np.ones(3)
-    gain: Array = np.median(first[usable] / face[usable].astype(np.float64), axis=0)
-    return gain
+    return np.median(first[usable] / face[usable].astype(np.float64), axis=0)

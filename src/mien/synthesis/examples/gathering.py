@@ -84,8 +84,7 @@ class ExamplePlan:
         used[self.choice.rows] = True
         rows = np.flatnonzero(used)
         thin = np.unique(np.rint(np.linspace(0, len(rows) - 1, MOST_STATISTICS)).astype(int))
-        found: Array = self.geometries[rows[thin] if len(rows) > MOST_STATISTICS else rows]
-        return found
+        return self.geometries[rows[thin] if len(rows) > MOST_STATISTICS else rows]
 
     def with_points(self, points: Mapping[int, Float[Array, "n 2"]]) -> ExamplePlan:
         """The same with better points in some pictures, the examples' among them.
@@ -185,8 +184,7 @@ def build_examples(
 def lip_gaps(layout: FeatureLayout, points: Float[Array, "N n 2"]) -> Float[Array, " N"]:
     """How far the lips are apart in their middle, in the unit of the points."""
     upper, lower = (layout.index(f"{which}_lip_inner") for which in ("upper", "lower"))
-    gaps: Array = np.linalg.norm(points[:, lower] - points[:, upper], axis=1)
-    return gaps
+    return np.linalg.norm(points[:, lower] - points[:, upper], axis=1)
 
 
 def _at_rest(series: FaceSeries, unfit: Sequence[str], wishes: Wishes) -> int:

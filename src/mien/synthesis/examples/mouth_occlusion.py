@@ -93,8 +93,7 @@ def _near(seconds: Float[Array, " N"], times: Float[Array, " c"]) -> Bool[Array,
     padded = np.concatenate([[-np.inf], times, [np.inf]])
     after = np.searchsorted(times, seconds) + 1
     wait, since = padded[after] - seconds, seconds - padded[after - 1]
-    near: Array = (np.minimum(wait, since) <= AROUND_SECONDS) | (wait + since <= GAP_SECONDS)
-    return near
+    return (np.minimum(wait, since) <= AROUND_SECONDS) | (wait + since <= GAP_SECONDS)
 
 
 def _outlines(names: tuple[str, ...]) -> list[list[int]]:
@@ -123,5 +122,4 @@ def _filled(
 
     drawn = np.zeros(mask.shape, np.uint8)
     cv2.fillPoly(drawn, [np.round((places[rows] - 0.5) * 16).astype(np.int32)], 1, shift=4)
-    inside: Array = (drawn > 0) & mask
-    return inside
+    return (drawn > 0) & mask

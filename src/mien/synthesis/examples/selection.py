@@ -215,8 +215,7 @@ class _Distances:
 
     def to(self, row: int) -> Float[Array, " N"]:
         """From every candidate to one."""
-        total: Array = self._by_region(row).sum(axis=0)
-        return total
+        return self._by_region(row).sum(axis=0)
 
     def largest(self, row: int, other: int) -> str:
         """The subregion in which both differ most."""

@@ -32,8 +32,7 @@ def feature_points_on(vertices: Float[Array, "*batch v 3"]) -> Float[Array, "*ba
     corners = generic.mesh.triangles[generic.landmark_triangles]
     shares = generic.landmark_barycentrics
     landmarks = np.einsum("...lkc,lk->...lc", np.asarray(vertices)[..., corners, :], shares)
-    points: Array = load_feature_layout().mixes @ landmarks
-    return points
+    return load_feature_layout().mixes @ landmarks
 
 
 @cache
@@ -70,5 +69,4 @@ def _mixes_of_vertices() -> Float[Array, "n v"]:
     landmarks = np.zeros((len(generic.landmark_triangles), len(generic.mesh.vertices)))
     corners = generic.mesh.triangles[generic.landmark_triangles]
     np.put_along_axis(landmarks, corners, generic.landmark_barycentrics, axis=1)
-    mixes: Array = load_feature_layout().mixes @ landmarks
-    return mixes
+    return load_feature_layout().mixes @ landmarks

@@ -16,8 +16,7 @@ _NEIGHBOURS, _LEAST_MM = 6, 0.3
 def inside_of_face() -> Bool[Array, " v"]:
     """(V,) what lies behind the lips and the lids."""
     regions = load_generic_head().regions
-    inside: Array = np.maximum(regions["mouth_cavity"], regions["eye_socket"]) >= 0.5
-    return inside
+    return np.maximum(regions["mouth_cavity"], regions["eye_socket"]) >= 0.5
 
 
 def spread_over_skin(values: Float[Array, "v k"], known: Bool[Array, " v"]) -> Float[Array, "v k"]:

@@ -171,8 +171,7 @@ class HeadSynthesizer:
         towards = np.stack([points[pupils], feature_points_on(vertices)[pupils]]) - centres
         towards /= np.linalg.norm(towards, axis=2, keepdims=True)
         wanted, found = map(yaw_pitch_of, towards)
-        turn: Array = np.clip(wanted - found, -MOST_RAD, MOST_RAD)
-        return turn
+        return np.clip(wanted - found, -MOST_RAD, MOST_RAD)
 
     def _learned(self) -> Inference:
         expressions = self.examples[1:] - self.examples[0]

@@ -178,8 +178,7 @@ def distances_of(
     missed = np.tensordot(shares, apart, axes=1)
     squares = (missed**2).sum(axis=2)
     parts = zip(squares, subregions.members, strict=True)
-    distances: Array = np.sqrt([row[members].mean() for row, members in parts])
-    return distances
+    return np.sqrt([row[members].mean() for row, members in parts])
 
 
 def _groups(names: Sequence[str], together: Sequence[Collection[str]] | None) -> list[list[int]]:
@@ -225,5 +224,4 @@ def apart_from(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Float[Ar
         EstimationError: all points in one place.
     """
     points = check_array("points", points, (len(example_set.layout.names), 2))
-    apart: Array = example_set.geometries - example_set.geometry(points)
-    return apart
+    return example_set.geometries - example_set.geometry(points)

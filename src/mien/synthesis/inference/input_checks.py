@@ -138,8 +138,7 @@ def _misfit(source: Float[Array, "k 2"], target: Float[Array, "k 2"]) -> float:
 def _spread(rows: Float[Array, "n d"]) -> Float[Array, "d d"]:
     """Covariance about the mean, and the least spread in every number."""
     apart = rows - rows.mean(axis=0)
-    spread: Array = apart.T @ apart / len(rows) + _LEAST_SPREAD**2 * np.eye(rows.shape[1])
-    return spread
+    return apart.T @ apart / len(rows) + _LEAST_SPREAD**2 * np.eye(rows.shape[1])
 
 
 def _motions(points: Float[Array, "n 2"]) -> Float[Array, "4 n 2"]:

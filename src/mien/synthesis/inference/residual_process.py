@@ -27,8 +27,7 @@ def closeness(places: Float[Array, "n 2"]) -> Float[Array, "n n"]:
     """
     places = check_array("places", places, (None, 2))
     apart = np.sqrt(3) * np.linalg.norm(places[:, None] - places, axis=2) / _REACH
-    near: Array = (1 + apart) * np.exp(-apart)
-    return near
+    return (1 + apart) * np.exp(-apart)
 
 
 def least_bend(

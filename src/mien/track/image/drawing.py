@@ -217,8 +217,7 @@ def _place_vertices(
 def _between(shades: Array, corners: _Corners, b: _Shares, column: int) -> float:
     """One of the shades at a place in a triangle."""
     i, j, k = corners
-    value: float = b[0] * shades[i, column] + b[1] * shades[j, column] + b[2] * shades[k, column]
-    return value
+    return b[0] * shades[i, column] + b[1] * shades[j, column] + b[2] * shades[k, column]
 
 
 @njit(inline="always")

@@ -111,5 +111,4 @@ def _reduced(image: Array, size: tuple[int, int]) -> Array:
 
     if (image.shape[1], image.shape[0]) == size:
         return image
-    reduced: Array = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    return reduced
+    return cv2.resize(image, size, interpolation=cv2.INTER_AREA)

@@ -201,8 +201,7 @@ def _misses(sight: Sight, places: Float[Array, "l 3"]) -> Float[Array, "l 2"]:
     """(L, 2) mm, along the picture's axes, by which landmarks are seen off these places."""
     camera = sight.camera
     mm_per_px = camera.to_camera(places)[:, 2:] / camera.focal_px
-    missed: Array = (sight.face.points[:, :2] - camera.project(places)) * mm_per_px
-    return missed
+    return (sight.face.points[:, :2] - camera.project(places)) * mm_per_px
 
 
 def _regression(
@@ -230,21 +229,16 @@ def facing(
 
 def facing_share(cosine: Float[Array, " n"]) -> Float[Array, " n"]:
     """(N,) of the angle between normal and view: the ramp of landmarks.facing_confidence."""
-    share: Array = np.clip((cosine - 0.1) / 0.8, 0.0, 1.0)
-    return share
+    return np.clip((cosine - 0.1) / 0.8, 0.0, 1.0)
 
 
 def landmark_normals(generic: GenericHead, mesh: Mesh) -> Float[Array, "478 3"]:
     """(478, 3) unit normals of a head's surface at the places of the landmarks."""
     normals = at_landmarks(generic, mesh.vertex_normals())
-    unit: Array = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    return unit
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def at_landmarks(generic: GenericHead, values: Float[Array, "*k v c"]) -> Float[Array, "*k 478 c"]:
     """What vertices have, (..., V, C), at the places of the landmarks."""
     corners = generic.mesh.triangles[generic.landmark_triangles]
-    at: Array = np.einsum(
-        "lc,...lcd->...ld", generic.landmark_barycentrics, values[..., corners, :]
-    )
-    return at
+    return np.einsum("lc,...lcd->...ld", generic.landmark_barycentrics, values[..., corners, :])

@@ -108,8 +108,7 @@ class Observation:
     def on(self, guess: Guess) -> Float[Array, "n 3"]:
         """(N, 3) mm, head space: where the landmarks are on such a head seen from there."""
         drifted = self.drift @ viewpoint(guess.R, guess.t)
-        places: Array = self.places + drifted + self.moves @ guess.face
-        return places
+        return self.places + drifted + self.moves @ guess.face
 
     def against(
         self, shown: DetectedFace, guess: Guess, size: tuple[int, int], focal_px: float

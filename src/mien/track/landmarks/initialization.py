@@ -202,5 +202,4 @@ class _Eyes:
         usual = np.diff(camera.project(self._lids.reshape(-1, 3)).reshape(2, 2, 2), axis=1)[:, 0]
         open_share = gaps / np.maximum(np.linalg.norm(usual, axis=1), 1e-9)
         trust = np.clip((open_share - _SHUT) / (_OPEN - _SHUT), 0, 1)
-        told: Array = trust / max(float(trust.sum()), 1.0)
-        return told
+        return trust / max(float(trust.sum()), 1.0)

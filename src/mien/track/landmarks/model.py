@@ -104,10 +104,7 @@ def _of_scores(generic: GenericHead, masks: Float[Array, "r v"]) -> Float[Array,
     moved = np.linalg.norm(generic.unit_offsets, axis=2)
     by_unit = masks @ moved.T / np.maximum(moved.sum(axis=1), 1e-9)
     column = {name: by_unit[:, index] for index, name in enumerate(generic.unit_names)}
-    shares: Array = np.stack(
-        [column.get(name, np.zeros(len(masks))) for name in BLENDSHAPE_NAMES], axis=1
-    )
-    return shares
+    return np.stack([column.get(name, np.zeros(len(masks))) for name in BLENDSHAPE_NAMES], axis=1)
 
 
 def _sigma(generic: GenericHead, meants: Sequence[Meant]) -> Float[Array, " 478"]:

@@ -62,8 +62,7 @@ class Answer:
         """(M, M) inverse covariance of the free unknowns, given picture and belief."""
         # Without D(p): that a weight is at the end of its range says nothing of how sure it is.
         own = self.matrix[np.ix_(self.free, self.free)]
-        information: Array = own + np.diag(self.belief.deviations[self.free] ** -2.0)
-        return information
+        return own + np.diag(self.belief.deviations[self.free] ** -2.0)
 
     @property
     def deviations(self) -> Float[Array, " n"]:

@@ -137,8 +137,7 @@ def _steps(model: TrackedFace, flows: Float[Array, "v n 2"], step_px: float) -> 
     fastest = np.linalg.norm(flows[outline], axis=2).max(axis=0)
     longest = np.full(len(fastest), _LONGEST)
     longest[:POSE_UNKNOWNS] = np.inf
-    steps: Array = np.minimum(step_px / np.maximum(fastest, 1e-9), longest)
-    return steps
+    return np.minimum(step_px / np.maximum(fastest, 1e-9), longest)
 
 
 def _with_layers(answers: Answers, numeric: Int[Array, " m"]) -> Answers:

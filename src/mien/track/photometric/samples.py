@@ -159,8 +159,7 @@ def _inside(weights: Float[Array, "h w"], ids: Int[Array, "h w"]) -> Float[Array
     import cv2
 
     whole = cv2.erode(np.uint8(ids >= 0), np.ones((3, 3), np.uint8), borderValue=0)
-    inside: Array = weights * whole
-    return inside
+    return weights * whole
 
 
 @njit(cache=True, nogil=True)

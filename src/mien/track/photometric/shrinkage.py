@@ -61,8 +61,7 @@ def steady_step(
         axes = axes.T / usual
         gains = _gains((axes @ step[unknowns]) ** 2 / variances, clear)
         matrix[own] += axes.T @ np.diag((1 - gains) / gains / variances) @ axes
-    taken: Array = np.linalg.solve(matrix, information @ step)
-    return taken
+    return np.linalg.solve(matrix, information @ step)
 
 
 def _gains(squares: Float[Array, " m"], clear: float) -> Float[Array, " m"]:
