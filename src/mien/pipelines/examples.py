@@ -87,7 +87,7 @@ class ExampleRequest:
     max_side: int = MAX_SIDE
     even: bool = True
 
-    def wishes(self, series: FaceSeries) -> SelectionOverrides:
+    def overrides(self, series: FaceSeries) -> SelectionOverrides:
         """The same by the rows of a series. Raises: InputError: names what is not there."""
         return SelectionOverrides(
             None if self.neutral is None else row_of(series, self.neutral, "--neutral"),
@@ -177,16 +177,18 @@ def gather_examples(
             look=looked,
             report=partial(tell, FINDING),
         )
-    wishes = request.wishes(series)
+    overrides = request.overrides(series)
     marks = _marks(series, layout)
     points = apply_all_annotations(layout, np.stack(looked.points), marks)
-    unfit = rejection_reasons(points, series.sizes, looked.lips.covered(series.seconds))
-    plan = plan_examples(layout, series, points, wishes=wishes, unfit=unfit, count=request.count)
+    rejections = rejection_reasons(points, series.sizes, looked.lips.occluded(series.seconds))
+    plan = plan_examples(
+        layout, series, points, overrides=overrides, rejections=rejections, count=request.count
+    )
     rows = plan.choice.rows.tolist()
     photos = dict(load_pictures(series, rows, partial(tell, FETCHING)))
     plan = plan.with_points(_steady(series, layout, photos, marks, partial(tell, LOOKING)))
     video = plain_name(series.source) if series.is_video else ""
-    examples, why = build_examples(plan, photos, source=video, even=request.even)
+    examples, why = build_examples(plan, photos, source=video, equalize=request.even)
     pictures = dict(zip(plan.names, plan.choice.reasons, strict=True)) | series.left_out
     unused = [note for file in series.files for note in annotation_notes(file, layout)]
     notes = [

@@ -227,7 +227,7 @@ class Synthesizer:
             distance_penalty=self.options.distance_penalty,
             slack=self.options.slack,
             tied=self.options.tied,
-            only=self.examples.only,
+            subsets=self.examples.subsets,
         )
         image = self._composer.render(points, coefficients, motion=motion, size=size, out=out)
         hull_px = mixture_distances(offsets, coefficients, subregions)

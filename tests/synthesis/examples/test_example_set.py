@@ -1,4 +1,4 @@
-"""Examples speak of the same points, and of geometry without the head's motion."""
+"""Examples have the same points, and geometries without head motion."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_bad_examples(photo, points, message):
         Example("joy", photo, points, "joy.png")
 
 
-def test_teeth_are_of_examples_that_there_are(example_set):
+def test_teeth_are_indices_of_examples(example_set):
     assert replace(example_set, teeth=(1,)).teeth == (1,)
     with pytest.raises(InputError, match="teeth: expected the index of one of 2 examples, got 2"):
         replace(example_set, teeth=(0, 2))
@@ -85,7 +85,7 @@ def test_at_least_one(example_set):
         replace(example_set, examples=())
 
 
-def test_names_are_unlike(example_set):
+def test_names_are_unique(example_set):
     with pytest.raises(InputError, match="'neutral' twice"):
         replace(example_set, examples=(example_set.neutral,) * 2)
 
