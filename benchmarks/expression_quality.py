@@ -77,12 +77,12 @@ COMPARED: Mapping[str, Shares] = {
 }
 SWITCHES: Mapping[str, Shares] = {
     "as mien does it by default": coefficients,
-    "the paper's: no penalty, each subregion for itself": _with(distance_penalty=0.0, together=()),
+    "the paper's: no penalty, each subregion for itself": _with(distance_penalty=0.0, tied=()),
     "penalty 0.02": _with(distance_penalty=0.02),
     "penalty 0.2": _with(distance_penalty=0.2),
-    "each subregion for itself": _with(together=()),
-    "brows together, and eyes with lids": _with(together=(BROWS, EYES)),
-    "upper face together": _with(together=(UPPER_FACE,)),
+    "each subregion for itself": _with(tied=()),
+    "brows together, and eyes with lids": _with(tied=(BROWS, EYES)),
+    "upper face together": _with(tied=(UPPER_FACE,)),
     "teeth from all examples": lambda s, p: coefficients(replace(s, teeth=()), p),
     "shares down to -0.01": _with(slack=0.01),
     "shares down to -0.05": _with(slack=0.05),

@@ -16,8 +16,8 @@ from mien.capture.faces.mediapipe_face import yaw_pitch
 from mien.capture.faces.sharpness import face_sharpness
 from mien.capture.video.video import Video
 from mien.synthesis.examples.example_set import Example, ExampleSet
-from mien.synthesis.examples.head_alignment import compensated
-from mien.synthesis.examples.landmark_averaging import steady_points
+from mien.synthesis.examples.head_alignment import align_to_neutral
+from mien.synthesis.examples.landmark_averaging import averaged_points
 from mien.synthesis.examples.selection import ExampleCandidates, choose_examples
 
 __all__ = [
@@ -34,7 +34,7 @@ __all__ = [
 
 BLOCK = 15
 """Frames that stay together, so that no held-out frame has its neighbour among the examples."""
-TEETH_SHOW = 0.03
+TEETH_GAP = 0.03
 """Gap of the lips, in widths of the face, from which on teeth can be seen between them."""
 _MESH_LANDMARKS = 468
 
@@ -96,7 +96,7 @@ def steadied(face: FilmedFace, rows: Collection[int], detector: LandmarkDetector
     points = face.points.copy()
     for row in rows:
         frame, landmarks = face.frames[row], face.landmarks[row]
-        points[row] = steady_points(face.layout, detector, frame, landmarks)
+        points[row] = averaged_points(face.layout, detector, frame, landmarks)
     return replace(face, points=points)
 
 
@@ -105,7 +105,7 @@ def chosen_rows(face: FilmedFace, count: int, *, odd: bool) -> list[int]:
     rows = np.flatnonzero((face.index // BLOCK % 2 == 1) == odd)
     points = face.points[rows]
     neutral = _at_rest(points, face.lip_gaps[rows])
-    geometries, _ = compensated(points, points[neutral])
+    geometries, _ = align_to_neutral(points, points[neutral])
     shapes = default_subregions(face.layout, points[neutral], (1, 1))
     regions = list(zip(shapes.names, shapes.members, strict=True))
     candidates = ExampleCandidates(geometries, face.sharpness[rows], face.pose[rows])
@@ -118,14 +118,14 @@ def example_set(face: FilmedFace, rows: Sequence[int]) -> ExampleSet:
     chosen, gaps = face.points[rows], face.lip_gaps[rows]
     standard = int(gaps.argmax())
     height, width = face.frames[0].shape[:2]
-    geometries, _ = compensated(chosen, chosen[0])
+    geometries, _ = align_to_neutral(chosen, chosen[0])
     return ExampleSet(
         layout=face.layout,
         examples=tuple(_example(face, row) for row in rows),
         standard=standard,
         statistics=geometries,
         subregions=default_subregions(face.layout, chosen[standard], (width, height)),
-        teeth=tuple(np.flatnonzero(gaps >= TEETH_SHOW).tolist()),
+        teeth=tuple(np.flatnonzero(gaps >= TEETH_GAP).tolist()),
     )
 
 
@@ -201,7 +201,7 @@ def _blurred(image: Float[Array, "h w"]) -> Float[Array, "h w"]:
 
 def _at_rest(points: Float[Array, "N n 2"], gaps: Float[Array, " N"]) -> int:
     """The frame that is nearest to the median one and whose mouth is not open."""
-    geometries, _ = compensated(points, points[0])
+    geometries, _ = align_to_neutral(points, points[0])
     width = float(np.ptp(np.median(geometries, axis=0)[:, 0]))
     apart = np.linalg.norm(geometries - np.median(geometries, axis=0), axis=(1, 2)) / width
     return int((apart + 3 * gaps).argmin())

@@ -26,7 +26,7 @@ from mien.io.head.head_folder import load_head
 from mien.render.picture import HeadRenderer
 from mien.report.track.comparison import face_pixels, face_psnr
 from mien.rig.state import PosedFace
-from mien.synthesis.heads.points import feature_points_on
+from mien.synthesis.heads.feature_points import feature_points_on
 from mien.synthesis.heads.synthesizer import HeadSynthesizer
 from mien.synthesis.synthesizer import SynthesisOptions
 from mien.track.lens import expected_focal
@@ -89,7 +89,7 @@ def tracked(head: Head, clip: Path, detector: LandmarkDetector) -> Tracked:
 def makings(clip: Tracked) -> Mapping[str, Making]:
     """What is compared: the first three have the tracked shape, and differ in texture alone."""
     rig = clip.synthesizer.rig
-    paper = HeadSynthesizer(clip.head, SynthesisOptions.paper(), reach=False, rig=rig)
+    paper = HeadSynthesizer(clip.head, SynthesisOptions.paper(), warp=False, rig=rig)
 
     def one(row: int, face: PosedFace) -> PosedFace:
         weights = np.zeros_like(face.weights)

@@ -19,9 +19,9 @@ from benchmarks.track_clips import CLIPS
 from mien.arrays import Array, Float
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.faces.detector import LandmarkDetector
-from mien.synthesis.inference.conditional import ConditionalMotion
-from mien.synthesis.inference.inferred import Inference
-from mien.synthesis.inference.propagation import COMPONENTS, Propagation
+from mien.synthesis.inference.conditional import ConditionalGaussian
+from mien.synthesis.inference.displacement_model import DisplacementModel
+from mien.synthesis.inference.propagation import COMPONENTS, MotionPropagation
 
 NAMES = ("d10", "d6")
 GIVEN = 17
@@ -36,14 +36,14 @@ _TO_THE_END = 1e-12
 
 @dataclass(frozen=True)
 class Way:
-    """Propagation with its options, and which of the layout's hierarchies it uses."""
+    """MotionPropagation with its options, and which of the layout's hierarchies it uses."""
 
     name: str
     options: Mapping[str, Any] = field(default_factory=dict)
     levels: int = 3
     backwards: bool = False
 
-    def made(self, layout: FeatureLayout, clip: HeldOut, iterations: int) -> Inference:
+    def made(self, layout: FeatureLayout, clip: HeldOut, iterations: int) -> DisplacementModel:
         """That learned from a clip, to be stopped after so many iterations if not before."""
         sets = layout.sets[: self.levels]
         if self.backwards:
@@ -51,13 +51,15 @@ class Way:
         options = dict(self.options)
         options.setdefault("components", COMPONENTS[: self.levels])
         options.setdefault("threshold", _TO_THE_END)
-        return Propagation(
+        return MotionPropagation(
             replace(layout, sets=sets), clip.statistics, max_iterations=iterations, **options
         )
 
 
 PRINTED = Way("as printed")
-HELD = Way("with trust 3 and prior", {"components": FINER, "trust": 3.0, "prior": 1.0})
+HELD = Way(
+    "with known weight 3 and prior", {"components": FINER, "known_weight": 3.0, "prior_weight": 1.0}
+)
 TRIED = (
     *(Way(f"{c} components in every set", {"components": c}) for c in (5, 8, 10, 15, 20, 30)),
     Way("20, 15, 15 components: the default"),
@@ -65,20 +67,20 @@ TRIED = (
     Way("20, 10, 5", {"components": (20, 10, 5)}),
     Way("20, 15: hierarchies 0 and 1", levels=2),
     Way("20: hierarchy 0", levels=1),
-    Way("20, 15, 15, trust 3", {"trust": 3.0}),
-    Way("20, 15, 15, trust 3, prior", {"trust": 3.0, "prior": 1.0}),
-    Way("30, 20, 15, trust 3, prior", {**HELD.options, "components": (30, 20, 15)}),
-    Way("40, 30, 20, trust 3, prior", {**HELD.options, "components": (40, 30, 20)}),
-    replace(HELD, name="60, 40, 30, trust 3, prior"),
-    Way("60, 40, 30, trust 1, prior", {**HELD.options, "trust": 1.0}),
-    Way("60, 40, 30, trust 10, prior", {**HELD.options, "trust": 10.0}),
-    Way("60, 40, 30, prior alone", {"components": FINER, "prior": 1.0}),
-    Way("60, trust 3, prior: hierarchy 0", {**HELD.options, "components": (60,)}, levels=1),
+    Way("20, 15, 15, known weight 3", {"known_weight": 3.0}),
+    Way("20, 15, 15, known weight 3, prior", {"known_weight": 3.0, "prior_weight": 1.0}),
+    Way("30, 20, 15, known weight 3, prior", {**HELD.options, "components": (30, 20, 15)}),
+    Way("40, 30, 20, known weight 3, prior", {**HELD.options, "components": (40, 30, 20)}),
+    replace(HELD, name="60, 40, 30, known weight 3, prior"),
+    Way("60, 40, 30, known weight 1, prior", {**HELD.options, "known_weight": 1.0}),
+    Way("60, 40, 30, known weight 10, prior", {**HELD.options, "known_weight": 10.0}),
+    Way("60, 40, 30, prior alone", {"components": FINER, "prior_weight": 1.0}),
+    Way("60, known weight 3, prior: hierarchy 0", {**HELD.options, "components": (60,)}, levels=1),
 )
 
 
 def mean_errors(
-    inference: Inference, layout: FeatureLayout, clip: HeldOut, count: int
+    inference: DisplacementModel, layout: FeatureLayout, clip: HeldOut, count: int
 ) -> Float[Array, " 3"]:
     """Px over 25 expressions: at points that were not given, at those given, at all."""
     known = known_points(layout, count)
@@ -104,8 +106,8 @@ def by_count(layout: FeatureLayout, clips: Mapping[str, HeldOut]) -> str:
     rows: list[list[object]] = []
     for name, clip in clips.items():
         unmoved = float(np.linalg.norm(clip.truth, axis=-1).mean())
-        best = ConditionalMotion(clip.statistics)
-        same = ConditionalMotion(clip.statistics, components=COMPONENTS[0])
+        best = ConditionalGaussian(clip.statistics)
+        same = ConditionalGaussian(clip.statistics, components=COMPONENTS[0])
         ways = [way.made(layout, clip, STEPS[-1]) for way in (PRINTED, HELD)]
         for count in KNOWN:
             errors = [
@@ -154,10 +156,10 @@ def what_was_tried(layout: FeatureLayout, clips: Mapping[str, HeldOut]) -> str:
         for way in (PRINTED, HELD):
             made = [way.made(layout, clip, STEPS[-1]) for clip in others.values()]
             rows.append([f"{way.name}: {title}", *_both(made, layout, others)])
-        closed = [ConditionalMotion(clip.statistics, components=30) for clip in others.values()]
+        closed = [ConditionalGaussian(clip.statistics, components=30) for clip in others.values()]
         rows.append([f"closed form, 30 components: {title}", *_both(closed, layout, others)])
     for count in (8, 15, 20, 30, 40, 60, 90):
-        closed = [ConditionalMotion(clip.statistics, components=count) for clip in clips.values()]
+        closed = [ConditionalGaussian(clip.statistics, components=count) for clip in clips.values()]
         rows.append([f"closed form, {count} components", *_both(closed, layout, clips)])
     return markdown_table(("17 points, 50 iterations", *clips), rows)
 
@@ -180,7 +182,7 @@ def stop_rule(layout: FeatureLayout, clips: Mapping[str, HeldOut]) -> str:
 
 
 def _both(
-    made: Sequence[Inference], layout: FeatureLayout, clips: Mapping[str, HeldOut]
+    made: Sequence[DisplacementModel], layout: FeatureLayout, clips: Mapping[str, HeldOut]
 ) -> list[float]:
     return [
         float(mean_errors(inference, layout, clip, GIVEN)[0])
@@ -232,7 +234,7 @@ def main() -> int:
         clips = {name: held_out(CLIPS[name], layout, detector) for name in NAMES}
     iterations, curves = fig_12(layout, clips)
     closed = {
-        name: float(mean_errors(ConditionalMotion(clip.statistics), layout, clip, GIVEN)[0])
+        name: float(mean_errors(ConditionalGaussian(clip.statistics), layout, clip, GIVEN)[0])
         for name, clip in clips.items()
     }
     draw(curves, closed)

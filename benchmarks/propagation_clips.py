@@ -11,7 +11,7 @@ from mien.arrays import Array, Float, Int
 from mien.assets.feature_points import FeatureLayout
 from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.video.video import Video
-from mien.synthesis.examples.head_alignment import compensated
+from mien.synthesis.examples.head_alignment import align_to_neutral
 
 __all__ = ["KNOWN", "HeldOut", "held_out", "known_points", "most_different"]
 
@@ -75,7 +75,7 @@ class HeldOut:
         return replace(self, truth=truth, statistics=statistics)
 
     def _seen_by(self, known: Array, displacements: Array) -> Array:
-        geometries, _ = compensated(displacements + self.neutral, self.neutral, by=known)
+        geometries, _ = align_to_neutral(displacements + self.neutral, self.neutral, subset=known)
         return geometries - self.neutral
 
 
@@ -90,7 +90,7 @@ def held_out(clip: Path, layout: FeatureLayout, detector: LandmarkDetector) -> H
     points = np.array([points for _, points in found])
     odd = np.array([index for index, _ in found]) // BLOCK % 2 == 1
     neutral = _most_usual(points[odd])
-    displacements = compensated(points, neutral)[0] - neutral
+    displacements = align_to_neutral(points, neutral)[0] - neutral
     chosen = most_different(displacements[~odd], EXPRESSIONS)
     return HeldOut(displacements[odd], displacements[~odd][chosen], neutral)
 
@@ -113,6 +113,6 @@ def most_different(displacements: Float[Array, "m n 2"], count: int) -> Int[Arra
 
 
 def _most_usual(points: Float[Array, "m n 2"]) -> Float[Array, "n 2"]:
-    geometries, _ = compensated(points, points[0])
+    geometries, _ = align_to_neutral(points, points[0])
     away = np.linalg.norm(geometries - np.median(geometries, axis=0), axis=-1).sum(axis=-1)
     return points[away.argmin()]

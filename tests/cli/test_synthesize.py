@@ -211,7 +211,7 @@ def test_the_papers_ways_are_asked_for(
         SynthesisOptions(),
         SynthesisOptions.paper(),
         replace(SynthesisOptions.paper(), distance_penalty=0.1),
-        SynthesisOptions(slack=0.01, together=(UPPER_FACE,)),
+        SynthesisOptions(slack=0.01, tied=(UPPER_FACE,)),
     ]
 
 

@@ -15,7 +15,7 @@ from mien.assets.feature_points import load_feature_layout
 from mien.io.files.image import load_image
 from mien.io.head.head_folder import load_head
 from mien.io.landmarks.points_json import write_points_json
-from mien.synthesis.heads.points import feature_points_on
+from mien.synthesis.heads.feature_points import feature_points_on
 from terminal import Mien
 
 LAYOUT = load_feature_layout()

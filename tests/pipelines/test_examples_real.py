@@ -10,8 +10,8 @@ from mien.assets.feature_points import load_feature_layout
 from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.video.video import Video
 from mien.pipelines.examples import gather_examples
-from mien.synthesis.examples.gathering import lip_gaps
-from mien.synthesis.examples.mouth_occlusion import LipColours
+from mien.synthesis.examples.example_plan import lip_gaps
+from mien.synthesis.examples.mouth_occlusion import LipContrast
 
 
 def test_a_smile_and_a_face_at_rest(shared: Path) -> None:
@@ -30,7 +30,7 @@ def test_a_smile_and_a_face_at_rest(shared: Path) -> None:
 def test_a_hand_before_the_mouth(shared: Path) -> None:
     """A clip in which one is there from frame 60 to 222, and not before 50 nor after 240."""
     video = Video(shared / "data" / "videos" / "WolfgangLanger_Pexels.mp4")
-    lips, index = LipColours(load_feature_layout()), []
+    lips, index = LipContrast(load_feature_layout()), []
     with LandmarkDetector() as detector:
         for frame in video.frames():
             if frame.index % 6:

@@ -111,8 +111,8 @@ def test_shares_do_not_jump(person, options, teeth):
     example_set, keys = replace(person[0], teeth=teeth), person[1]
 
     def shares(place):
-        together, penalty = options.together, options.distance_penalty
-        return coefficients(example_set, place, distance_penalty=penalty, together=together)
+        tied, penalty = options.tied, options.distance_penalty
+        return coefficients(example_set, place, distance_penalty=penalty, tied=tied)
 
     places = path_of(keys, STEPS)
     found = [shares(place) for place in places]

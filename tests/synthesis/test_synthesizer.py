@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hull import hull_distances
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
 from mien.errors import EstimationError, InputError
 from mien.numeric.planar_similarity import PlanarMotion
 from mien.synthesis.examples.example_set import Example, ExampleSet
-from mien.synthesis.inference.coefficients import hull_distances
 from mien.synthesis.synthesizer import Synthesis, SynthesisOptions, Synthesizer
 
 WIDTH, HEIGHT = 160, 200
@@ -83,7 +83,7 @@ def test_one_or_two_points_move_a_face_whose_head_is_still(person, count):
 
 
 def test_three_points_that_shift_are_a_head_that_moved_or_an_expression(person):
-    """What is told of the head is no expression: alike wherever the head is. A still one is not."""
+    """Estimated head motion is no expression: the same wherever the head is. A still one is not."""
     example_set, _ = person
     neutral = example_set.neutral.points
     names = ("right_mouth_corner", "left_mouth_corner", "menton")
@@ -93,11 +93,11 @@ def test_three_points_that_shift_are_a_head_that_moved_or_an_expression(person):
     def shifted(by, head):
         return synthesizer.complete(known, neutral[known] + by, head=head)
 
-    told = shifted([0, -3], "told") - shifted([0, 0], "told")
-    np.testing.assert_allclose(told, np.broadcast_to([0, -3], told.shape), atol=1e-6)
+    moved = shifted([0, -3], "estimated") - shifted([0, 0], "estimated")
+    np.testing.assert_allclose(moved, np.broadcast_to([0, -3], moved.shape), atol=1e-6)
     still = shifted([0, -3], "still") - shifted([0, 0], "still")
     assert np.linalg.norm(still - [0, -3], axis=1).mean() > 1
-    np.testing.assert_allclose(still[known], told[known], atol=1e-6)
+    np.testing.assert_allclose(still[known], moved[known], atol=1e-6)
 
 
 def test_all_points_stay_where_they_are(person):
@@ -106,7 +106,7 @@ def test_all_points_stay_where_they_are(person):
     np.testing.assert_array_equal(completed, truth)
 
 
-def test_one_picture_tells_of_no_other_points(person):
+def test_one_picture_is_too_few_to_complete_points(person):
     """All points need none; from a few, nothing can be learned."""
     truth = new_expression(person)
     synthesizer = Synthesizer(replace(person[0], statistics=person[0].statistics[:1]))
@@ -120,10 +120,10 @@ def test_a_set_of_points_is_learned_once(person, monkeypatch):
     from mien.synthesis import synthesizer as module
 
     learned = []
-    original = module.ConditionalMotion
+    original = module.ConditionalGaussian
     monkeypatch.setattr(
         module,
-        "ConditionalMotion",
+        "ConditionalGaussian",
         lambda *a, **options: learned.append(1) or original(*a, **options),
     )
     synthesizer = Synthesizer(person[0])
@@ -133,13 +133,37 @@ def test_a_set_of_points_is_learned_once(person, monkeypatch):
     assert len(learned) == 2
 
 
-def test_the_order_of_points_is_all_one(person):
+def test_the_order_of_points_does_not_matter(person):
     points = new_expression(person)
     known = np.array([90, 4, 33, 71, 12])
     synthesizer = Synthesizer(person[0])
     completed = synthesizer.complete(known, points[known])
     again = synthesizer.complete(known[::-1], points[known[::-1]])
     np.testing.assert_array_equal(completed, again)
+
+
+def test_points_may_be_named(person):
+    synthesizer, points = Synthesizer(person[0]), new_expression(person)
+    names = ["left_mouth_corner", "menton", "nose_tip"]
+    known = np.array([person[0].layout.index(name) for name in names])
+    expected = synthesizer.complete(known, points[known])
+    by_name = dict(zip(names, points[known].tolist(), strict=True))
+    np.testing.assert_array_equal(synthesizer.complete(by_name), expected)
+    np.testing.assert_array_equal(synthesizer.complete(names, points[known]), expected)
+
+
+def test_bad_names_of_points(person):
+    synthesizer = Synthesizer(person[0])
+    with pytest.raises(InputError, match="feature point: expected a point of zhang134"):
+        synthesizer.complete({"left_mouth_korner": (1.0, 2.0)})
+    with pytest.raises(InputError, match="known: expected indices of at least one point"):
+        synthesizer.complete({})
+    with pytest.raises(InputError, match="positions: expected one for each of the points"):
+        synthesizer.complete(["menton"])
+    with pytest.raises(InputError, match="positions: expected none beside positions by name"):
+        synthesizer.complete({"menton": (1.0, 2.0)}, [(1.0, 2.0)])
+    with pytest.raises(InputError, match=r"displacements: expected shape \(1, 2\)"):
+        synthesizer.complete({"menton": (1.0, 2.0, 3.0)})
 
 
 @pytest.mark.parametrize("index", range(6))
@@ -152,7 +176,7 @@ def test_an_examples_own_points_are_made_from_it(person, index):
     assert made.image.shape == (HEIGHT, WIDTH, 3)
 
 
-def test_what_lies_outside_of_the_hull_is_told_by_subregion(person):
+def test_the_distance_from_the_hull_is_given_by_subregion(person):
     example_set, _ = person
     points = example_set.neutral.points.copy()
     names = example_set.subregions.names
@@ -192,7 +216,7 @@ def test_the_picture_is_drawn_into_memory_that_is_given(person):
 
 def test_the_paper_has_none_of_the_additions():
     paper = SynthesisOptions.paper()
-    assert (paper.distance_penalty, paper.slack, paper.together) == (0, 0, ())
+    assert (paper.distance_penalty, paper.slack, paper.tied) == (0, 0, ())
     assert paper.propagation == "printed"
 
 
@@ -206,7 +230,7 @@ def test_bad_options_and_points(person):
     with pytest.raises(InputError, match="distance_penalty: expected finite numbers, got nan"):
         SynthesisOptions(distance_penalty=np.nan)
     synthesizer = Synthesizer(person[0])
-    with pytest.raises(InputError, match="head: expected told or still, got moved"):
+    with pytest.raises(InputError, match="head: expected estimated or still, got moved"):
         synthesizer.complete(np.array([3]), np.zeros((1, 2)), head="moved")
     with pytest.raises(InputError, match="known: expected each point once, got point 3 twice"):
         synthesizer.complete(np.array([3, 3, 4]), np.zeros((3, 2)))

@@ -140,7 +140,7 @@ def _of_head(
     photo: Path | None,
     weights: Path | None,
     options: SynthesisOptions,
-    reach: bool,
+    warp: bool,
     view: dict[str, Any],
     json_: bool,
 ) -> None:
@@ -157,7 +157,7 @@ def _of_head(
             photo=photo,
             weights=weights,
             options=options,
-            reach=reach,
+            warp=warp,
             view=_view(**{name.removeprefix("--"): value for name, value in view.items()}),
             progress=progress,
         )
@@ -215,7 +215,7 @@ def _options(
         "propagation": propagation,
         "distance_penalty": distance_penalty,
         "slack": slack,
-        "together": (UPPER_FACE,) if upper_face_as_one else None,
+        "tied": (UPPER_FACE,) if upper_face_as_one else None,
     }
     usual = SynthesisOptions.paper() if paper else SynthesisOptions()
     return replace(usual, **{name: value for name, value in given.items() if value is not None})

@@ -28,22 +28,27 @@ from mien.io.examples.example_folder import (
 from mien.io.files.atomic import atomic_folder
 from mien.io.files.image import encode_image
 from mien.io.files.manifest import kept_notes
-from mien.pipelines.example_marks import (
+from mien.pipelines.example_annotations import (
     Marks,
-    all_with_marks,
-    mark_files,
-    mark_notes,
-    read_marks,
-    with_marks,
+    annotation_files,
+    annotation_notes,
+    apply_all_annotations,
+    apply_annotations,
+    read_annotated_points,
 )
 from mien.reading.names import plain_name
 from mien.report.example_sheet import example_sheet
-from mien.synthesis.examples.brows import detected_points
+from mien.synthesis.examples.brow_correction import detected_points
+from mien.synthesis.examples.example_plan import (
+    ExamplePlan,
+    SelectionOverrides,
+    build_examples,
+    plan_examples,
+)
 from mien.synthesis.examples.example_set import ExampleSet
-from mien.synthesis.examples.gathering import ExamplePlan, Wishes, build_examples, plan_examples
-from mien.synthesis.examples.landmark_averaging import steady_points
-from mien.synthesis.examples.mouth_occlusion import LipColours
-from mien.synthesis.examples.quality_filter import COVERED, CUT, unfit_reasons
+from mien.synthesis.examples.landmark_averaging import averaged_points
+from mien.synthesis.examples.mouth_occlusion import LipContrast
+from mien.synthesis.examples.quality_filter import CUT, OCCLUDED, rejection_reasons
 from mien.synthesis.examples.selection import COUNT
 
 if TYPE_CHECKING:
@@ -82,9 +87,9 @@ class ExampleRequest:
     max_side: int = MAX_SIDE
     even: bool = True
 
-    def wishes(self, series: FaceSeries) -> Wishes:
+    def wishes(self, series: FaceSeries) -> SelectionOverrides:
         """The same by the rows of a series. Raises: InputError: names what is not there."""
-        return Wishes(
+        return SelectionOverrides(
             None if self.neutral is None else row_of(series, self.neutral, "--neutral"),
             None if self.standard is None else row_of(series, self.standard, "--standard"),
             _all_rows(series, self.include, "--include"),
@@ -174,8 +179,8 @@ def gather_examples(
         )
     wishes = request.wishes(series)
     marks = _marks(series, layout)
-    points = all_with_marks(layout, np.stack(looked.points), marks)
-    unfit = unfit_reasons(points, series.sizes, looked.lips.covered(series.seconds))
+    points = apply_all_annotations(layout, np.stack(looked.points), marks)
+    unfit = rejection_reasons(points, series.sizes, looked.lips.covered(series.seconds))
     plan = plan_examples(layout, series, points, wishes=wishes, unfit=unfit, count=request.count)
     rows = plan.choice.rows.tolist()
     photos = dict(load_pictures(series, rows, partial(tell, FETCHING)))
@@ -183,7 +188,7 @@ def gather_examples(
     video = plain_name(series.source) if series.is_video else ""
     examples, why = build_examples(plan, photos, source=video, even=request.even)
     pictures = dict(zip(plan.names, plan.choice.reasons, strict=True)) | series.left_out
-    unused = [note for file in series.files for note in mark_notes(file, layout)]
+    unused = [note for file in series.files for note in annotation_notes(file, layout)]
     notes = [
         *series.notes,
         *unused,
@@ -204,8 +209,8 @@ def _steady(
     found = {}
     with LandmarkDetector() as detector:
         for number, (row, photo) in enumerate(photos.items()):
-            points = steady_points(layout, detector, photo.pixels, series.landmarks[row])
-            found[row] = with_marks(layout, points, marks.get(row, {}))
+            points = averaged_points(layout, detector, photo.pixels, series.landmarks[row])
+            found[row] = apply_annotations(layout, points, marks.get(row, {}))
             report(number + 1, len(photos))
     return found
 
@@ -214,7 +219,7 @@ class _Looked:
     """What is taken from each picture as long as its pixels are there."""
 
     def __init__(self, layout: FeatureLayout) -> None:
-        self.lips = LipColours(layout)
+        self.lips = LipContrast(layout)
         self.points: list[Array] = []
         self._layout = layout
 
@@ -227,8 +232,10 @@ def _marks(series: FaceSeries, layout: FeatureLayout) -> dict[int, Marks]:
     """Hand-made marks, by row, where there are any."""
     found: dict[int, Marks] = {}
     for row, file in enumerate(series.files):
-        if mark_files(file):
-            found[row] = read_marks(file, load_photo(file, max_side=series.max_side), layout)
+        if annotation_files(file):
+            found[row] = read_annotated_points(
+                file, load_photo(file, max_side=series.max_side), layout
+            )
     return {row: marks for row, marks in found.items() if marks}
 
 
@@ -264,7 +271,7 @@ KINDS = {
     "blurred": "blurred",
     "turned away": "turned away",
     CUT: "cut by the picture's edge",
-    COVERED: "with something before the mouth",
+    OCCLUDED: "with something before the mouth",
     "small": "small",
     "excluded": "excluded",
 }

@@ -16,7 +16,7 @@ from mien.errors import EstimationError
 from mien.head import Head
 from mien.pipelines.tracking.ready_head import ReadyHead
 from mien.rig.rig import Rig
-from mien.synthesis.heads.points import feature_points_on
+from mien.synthesis.heads.feature_points import feature_points_on
 from mien.track.lens import expected_focal
 from mien.track.tracker import STRANGE_RMS, TrackOptions
 

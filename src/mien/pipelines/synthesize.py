@@ -24,11 +24,11 @@ from mien.synthesis.synthesizer import Synthesis, SynthesisOptions, Synthesizer
 if TYPE_CHECKING:
     from mien.pipelines.build import Progress
 
-__all__ = ["HULL_SHARE", "Synthesized", "hull_note", "synthesize_expression"]
+__all__ = ["HULL_TOLERANCE", "SynthesizedPicture", "hull_note", "synthesize_expression"]
 
 READING, FINDING, DRAWING = "Reading the examples", "Finding the face", "Drawing"
 
-HULL_SHARE = 0.01
+HULL_TOLERANCE = 0.01
 """Face widths by which a subregion may leave what its examples reach before it is told of.
 
 Of held-out frames of two clips, 40 examples each, 5 in 100 subregions leave it so far, in a fifth
@@ -38,7 +38,7 @@ of the frames; their PSNR is 1 to 2 dB below the same subregion's usual one, and
 
 
 @dataclass(frozen=True)
-class Synthesized:
+class SynthesizedPicture:
     """What came of it.
 
     Attributes:
@@ -64,7 +64,7 @@ def synthesize_expression(
     head: HeadChoice = "auto",
     face: int | None = None,
     progress: Progress | None = None,
-) -> Synthesized:
+) -> SynthesizedPicture:
     """Draw an expression of the person in an example folder and write the picture.
 
     Args:
@@ -115,18 +115,18 @@ def hull_note(examples: ExampleSet, hull_px: dict[str, float]) -> str | None:
     told = [
         f"{name.replace('_', ' ')} {px:.1f} px ({px / width:.1%})"
         for name, px in beyond
-        if px > HULL_SHARE * width
+        if px > HULL_TOLERANCE * width
     ]
     if not told:
         return None
-    bound = f"more than {HULL_SHARE:.0%} of the face's width"
+    bound = f"more than {HULL_TOLERANCE:.0%} of the face's width"
     return f"beyond what the examples show, by {bound}: {', '.join(told)}"
 
 
-def _drawn(synthesizer: Synthesizer, target: Target) -> Synthesized:
+def _drawn(synthesizer: Synthesizer, target: Target) -> SynthesizedPicture:
     made = synthesizer.synthesize(target.points, motion=target.motion, size=target.size)
     names = synthesizer.examples.subregions.names
     hull_px = dict(zip(names, made.hull_px.tolist(), strict=True))
     beyond = hull_note(synthesizer.examples, hull_px)
     notes = (*target.notes, *([beyond] if beyond else []))
-    return Synthesized(made, hull_px, notes)
+    return SynthesizedPicture(made, hull_px, notes)

@@ -24,11 +24,11 @@ from mien.synthesis.synthesizer import SynthesisOptions
 if TYPE_CHECKING:
     from mien.pipelines.build import Progress
 
-__all__ = ["HULL_MM", "HeadView", "SynthesizedHead", "synthesize_head"]
+__all__ = ["HULL_TOLERANCE_MM", "HeadView", "SynthesizedHeadPicture", "synthesize_head"]
 
 READING, FINDING, DRAWING = "Reading the head", "Finding the face", "Drawing"
 
-HULL_MM = 2.0
+HULL_TOLERANCE_MM = 2.0
 """By so much a subregion may leave what the expressions show before it is told of."""
 _FARTHEST_MM = 80.0
 """No jaw opens so far: farther from where they are at rest, points are of another space."""
@@ -52,7 +52,7 @@ class HeadView:
 
 
 @dataclass(frozen=True)
-class SynthesizedHead:
+class SynthesizedHeadPicture:
     """What came of it.
 
     Attributes:
@@ -76,10 +76,10 @@ def synthesize_head(
     photo: str | Path | None = None,
     weights: str | Path | None = None,
     options: SynthesisOptions | None = None,
-    reach: bool = True,
+    warp: bool = True,
     view: HeadView | None = None,
     progress: Progress | None = None,
-) -> SynthesizedHead:
+) -> SynthesizedHeadPicture:
     """Make an expression of a head and write a picture of it.
 
     Args:
@@ -90,7 +90,7 @@ def synthesize_head(
             it is seen there.
         weights: W.json, which expressions made which subregion.
         options: as for `HeadSynthesizer`.
-        reach: as for `HeadSynthesizer`.
+        warp: as for `HeadSynthesizer`.
         view: of `points`.
         progress: told the stage, steps done and their total.
 
@@ -107,12 +107,12 @@ def synthesize_head(
     tell(READING, 1, 1)
     if photo is not None:
         tell(FINDING, 0, 0)
-        made = _of_photo(head, photo, options, reach)
+        made = _of_photo(head, photo, options, warp)
         tell(FINDING, 1, 1)
     else:
         assert points is not None
         tell(DRAWING, 0, 0)
-        made = _of_points(head, points, options, reach, view or HeadView())
+        made = _of_points(head, points, options, warp, view or HeadView())
         tell(DRAWING, 1, 1)
     save_image(output, made.picture)
     if weights is not None:
@@ -121,7 +121,7 @@ def synthesize_head(
     hull_mm = dict(zip(names, made.synthesis.hull_mm.tolist(), strict=True))
     height, width = made.picture.shape[:2]
     notes = (*made.notes, *_hull_notes(hull_mm))
-    return SynthesizedHead((width, height), made.synthesis, hull_mm, notes)
+    return SynthesizedHeadPicture((width, height), made.synthesis, hull_mm, notes)
 
 
 @dataclass(frozen=True)
@@ -136,10 +136,10 @@ def _of_points(
     head: Head,
     path: str | Path,
     options: SynthesisOptions | None,
-    reach: bool,
+    warp: bool,
     view: HeadView,
 ) -> _Made:
-    synthesizer = HeadSynthesizer(head, options, reach=reach)
+    synthesizer = HeadSynthesizer(head, options, warp=warp)
     known, positions = _read_points(path, synthesizer.layout)
     _check_points(path, synthesizer, known, positions)
     made = synthesizer.synthesize(synthesizer.complete(known, positions))
@@ -149,14 +149,14 @@ def _of_points(
     return _Made(synthesizer, made, picture)
 
 
-def _of_photo(head: Head, path: str | Path, options: SynthesisOptions | None, reach: bool) -> _Made:
+def _of_photo(head: Head, path: str | Path, options: SynthesisOptions | None, warp: bool) -> _Made:
     from mien.capture.images.photos import load_photo
     from mien.pipelines.head_in_photo import find_head
 
     photo = load_photo(path)
     found = find_head(head, photo)
     notes = [f"{photo.name}: {note}" for note in photo.notes]
-    synthesizer = HeadSynthesizer(head, options, reach=reach, rig=found.rig)
+    synthesizer = HeadSynthesizer(head, options, warp=warp, rig=found.rig)
     made = synthesizer.synthesize(found.points)
     renderer = HeadRenderer(head, rig=synthesizer.rig)
     picture = renderer.draw_posed(made.face, found.camera, background=photo.pixels)
@@ -207,5 +207,7 @@ def _write_weights(
 
 def _hull_notes(hull_mm: dict[str, float]) -> tuple[str, ...]:
     beyond = sorted(hull_mm.items(), key=lambda item: -item[1])
-    told = [f"{name.replace('_', ' ')} by {mm:.1f} mm" for name, mm in beyond if mm > HULL_MM]
+    told = [
+        f"{name.replace('_', ' ')} by {mm:.1f} mm" for name, mm in beyond if mm > HULL_TOLERANCE_MM
+    ]
     return (f"beyond what the expressions show: {', '.join(told)}",) if told else ()

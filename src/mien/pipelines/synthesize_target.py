@@ -17,17 +17,22 @@ from mien.io.files.atomic import check_file_place, check_files_apart
 from mien.io.files.image import image_kind
 from mien.io.landmarks.points_file import read_points
 from mien.numeric.planar_similarity import PlanarMotion
-from mien.pipelines.example_marks import mark_files, mark_notes, read_marks, with_marks
-from mien.synthesis.examples.landmark_averaging import steady_points
+from mien.pipelines.example_annotations import (
+    annotation_files,
+    annotation_notes,
+    apply_annotations,
+    read_annotated_points,
+)
+from mien.synthesis.examples.landmark_averaging import averaged_points
 from mien.synthesis.inference.input_checks import (
-    ENOUGH_STATISTICS,
-    STRANGER,
+    MIN_STATISTICS,
+    OUTLIER_RMS,
     face_width,
     head_moved,
     look_mirrored,
-    oddness,
+    mahalanobis_rms,
 )
-from mien.synthesis.synthesizer import LEAST_TELLING, Synthesizer
+from mien.synthesis.synthesizer import MIN_MOTION_POINTS, Synthesizer
 
 __all__ = ["HeadChoice", "Target", "check_request", "target_from_photo", "target_from_points"]
 
@@ -81,7 +86,7 @@ def check_request(
     places = [path for path in written if path is not None]
     image_kind(places[0])
     read = [Path(path) for path in (points, photo) if path is not None]
-    check_files_apart(places, [folder, *read, *mark_files(read[0])])
+    check_files_apart(places, [folder, *read, *annotation_files(read[0])])
     for path in places:
         check_file_place(path)
 
@@ -103,15 +108,15 @@ def target_from_points(
     """
     layout = synthesizer.examples.layout
     known, positions = read_points(path, layout)
-    if len(known) < LEAST_TELLING:
-        expected = f"at least {LEAST_TELLING} points of {layout.name}"
+    if len(known) < MIN_MOTION_POINTS:
+        expected = f"at least {MIN_MOTION_POINTS} points of {layout.name}"
         raise InputError(path, expected, ", ".join(layout.names[index] for index in known))
     _check_sides(synthesizer, path, known, positions)
     notes = _outside_notes(synthesizer, path, known, positions)
     moved = head == "moved" or (
         head == "auto" and head_moved(synthesizer.examples, known, positions)
     )
-    points = synthesizer.complete(known, positions, head="told" if moved else "still")
+    points = synthesizer.complete(known, positions, head="estimated" if moved else "still")
     if not moved:
         return Target(points, notes=notes)
     if head == "auto":
@@ -142,12 +147,12 @@ def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int |
     with LandmarkDetector() as detector:
         landmarks = detector.detect(photo, face=face)
         # As the examples' points are found: see there.
-        detected = steady_points(layout, detector, photo.pixels, landmarks.points)
-    points = with_marks(layout, detected, read_marks(Path(path), photo, layout))
+        detected = averaged_points(layout, detector, photo.pixels, landmarks.points)
+    points = apply_annotations(layout, detected, read_annotated_points(Path(path), photo, layout))
     points = _guessed_outside(synthesizer, points, photo.size)
     motion = synthesizer.head_motion(points)
     notes = [f"{path}: {note}" for note in (*photo.notes, *landmarks.notes)]
-    notes += [*mark_notes(Path(path), layout), *_stranger_notes(synthesizer, path, points)]
+    notes += [*annotation_notes(Path(path), layout), *_stranger_notes(synthesizer, path, points)]
     if motion.scale > _LARGER:
         times = f"{float(motion.scale):.1f} times as large as in the examples"
         notes.append(f"{path}: the face is {times}: the picture is as soft as they are")
@@ -162,10 +167,10 @@ def _guessed_outside(
     10 to 20 % nearer than the detector's guess where the edge cuts more than the chin (cap13).
     """
     known = np.flatnonzero(inside_picture(points, size))
-    enough = len(synthesizer.examples.statistics) >= ENOUGH_STATISTICS
-    if not enough or not LEAST_TELLING <= len(known) < len(points):
+    enough = len(synthesizer.examples.statistics) >= MIN_STATISTICS
+    if not enough or not MIN_MOTION_POINTS <= len(known) < len(points):
         return points
-    return synthesizer.complete(known, points[known], head="told")
+    return synthesizer.complete(known, points[known], head="estimated")
 
 
 def _check_sides(
@@ -214,11 +219,11 @@ def _told_outside(
 def _stranger_notes(
     synthesizer: Synthesizer, path: str | Path, points: Float[Array, "n 2"]
 ) -> list[str]:
-    odd = oddness(synthesizer.examples, points)
-    if odd is None or odd < STRANGER:
+    odd = mahalanobis_rms(synthesizer.examples, points)
+    if odd is None or odd < OUTLIER_RMS:
         return []
     return [
         f"{path}: the face looks like another person's, or is turned far: its shape is "
-        f"{odd / STRANGER:.1f} times as far as usual from all that was seen of this person; "
+        f"{odd / OUTLIER_RMS:.1f} times as far as usual from all that was seen of this person; "
         "its points are taken as they are"
     ]

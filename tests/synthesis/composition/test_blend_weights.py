@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mien.synthesis.composition.blend_weights import FADE_UNIT, fade_map
+from mien.synthesis.composition.blend_weights import WEIGHT_UNIT, pack_blend_weights
 
 HEIGHT, WIDTH = 7, 9
 
@@ -21,18 +21,18 @@ def fades(request, rng):
 
 
 def test_planes_are_the_fades_and_what_is_around(fades):
-    planes = fade_map(fades).planes.astype(int)
-    np.testing.assert_array_equal(planes.sum(0), FADE_UNIT)
+    planes = pack_blend_weights(fades).planes.astype(int)
+    np.testing.assert_array_equal(planes.sum(0), WEIGHT_UNIT)
     around = 1 - fades.sum(2)
     drawn = np.concatenate([fades, around[..., None]], 2).reshape(HEIGHT * WIDTH, -1).T
-    error = np.abs(planes / FADE_UNIT - drawn)
+    error = np.abs(planes / WEIGHT_UNIT - drawn)
     # But for the greatest, which takes what the others leave.
-    assert np.sort(error, axis=0)[-2].max() <= 0.5 / FADE_UNIT + 1e-6
-    assert error.max() <= len(planes) * 0.5 / FADE_UNIT
+    assert np.sort(error, axis=0)[-2].max() <= 0.5 / WEIGHT_UNIT + 1e-6
+    assert error.max() <= len(planes) * 0.5 / WEIGHT_UNIT
 
 
 def test_sets_are_those_of_a_pixel_and_its_neighbours(fades):
-    mapped = fade_map(fades)
+    mapped = pack_blend_weights(fades)
     planes = mapped.planes.reshape(-1, HEIGHT, WIDTH)
     codes = mapped.codes.reshape(HEIGHT, WIDTH)
     for row in range(HEIGHT):
@@ -45,7 +45,7 @@ def test_sets_are_those_of_a_pixel_and_its_neighbours(fades):
 
 
 def test_what_is_the_same_has_one_code(fades):
-    mapped = fade_map(fades)
+    mapped = pack_blend_weights(fades)
     assert len(np.unique(mapped.holds, axis=0)) == len(mapped.holds)
     codes = mapped.codes.reshape(HEIGHT, WIDTH)
     assert len(np.unique(codes[4])) == len(np.unique(codes[6])) == 1

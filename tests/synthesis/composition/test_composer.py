@@ -12,8 +12,8 @@ from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
 from mien.errors import InputError
 from mien.numeric.planar_similarity import PlanarMotion
+from mien.synthesis.composition.border_padding import pad_with_blurred_border
 from mien.synthesis.composition.composer import Composer
-from mien.synthesis.composition.surroundings import with_surroundings
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
 WIDTH, HEIGHT, COUNT = 240, 300, 4
@@ -148,7 +148,7 @@ def test_a_moved_picture_is_the_unmoved_one_moved(noisy):
     )
     np.testing.assert_array_equal(moved[9 : 9 + HEIGHT, 17 : 17 + WIDTH], still)
     # Beyond its edges the photo goes on.
-    larger, margin = with_surroundings(noisy.neutral.photo)
+    larger, margin = pad_with_blurred_border(noisy.neutral.photo)
     above = larger[margin - 9 : margin, margin - 17 : margin - 17 + size[0]]
     np.testing.assert_array_equal(moved[:9], above)
 
@@ -220,7 +220,7 @@ def test_a_face_outside_of_the_picture_is_no_harm(noisy):
     motion = similarity(1, 0, WIDTH, 40)
     points = noisy.neutral.points + np.array([2 * WIDTH, 40])
     image = Composer(noisy).render(points, shares(noisy, [0, 0, 1, 0]), motion=motion)
-    larger, margin = with_surroundings(noisy.neutral.photo)
+    larger, margin = pad_with_blurred_border(noisy.neutral.photo)
     beside = larger[margin : margin + HEIGHT - 40, margin - 20 : margin]
     np.testing.assert_array_equal(image[40:, -20:], beside)
 

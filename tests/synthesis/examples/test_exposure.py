@@ -9,7 +9,7 @@ import pytest
 
 from mien.assets.feature_points import load_feature_layout
 from mien.synthesis.examples.example_set import Example
-from mien.synthesis.examples.exposure import brightened, evened, exposure_gains
+from mien.synthesis.examples.exposure import apply_gain, equalize_exposure, exposure_gains
 
 GAIN = np.array([0.9, 1.0, 1.2])
 
@@ -28,13 +28,13 @@ def face(layout, rng):
 
 
 def test_gains_are_those_that_the_photos_were_made_with(layout, face):
-    darker = replace(face, name="b", photo=brightened(face.photo, 1 / GAIN))
+    darker = replace(face, name="b", photo=apply_gain(face.photo, 1 / GAIN))
     np.testing.assert_allclose(exposure_gains(layout, [face, darker]), [[1, 1, 1], GAIN], atol=0.01)
 
 
 def test_an_expression_and_a_moved_head_are_no_exposure(layout, face):
     """What is unlike in a tenth of the face, and where the photo is cut differently."""
-    photo = np.roll(brightened(face.photo, 1 / GAIN), (7, -5), axis=(0, 1))
+    photo = np.roll(apply_gain(face.photo, 1 / GAIN), (7, -5), axis=(0, 1))
     chin = np.rint(face.points[layout.index("chin")]).astype(int)
     photo[chin[1] - 12 : chin[1] + 12, chin[0] - 12 : chin[0] + 12] = 20
     moved = Example("b", photo, face.points + np.array([-5, 7]), "b")
@@ -42,7 +42,7 @@ def test_an_expression_and_a_moved_head_are_no_exposure(layout, face):
 
 
 def test_white_and_black_are_not_compared(layout, face):
-    photo = brightened(face.photo, np.full(3, 1.7))
+    photo = apply_gain(face.photo, np.full(3, 1.7))
     assert (photo == 255).any()
     clipped = Example("b", photo, face.points, "b")
     np.testing.assert_allclose(exposure_gains(layout, [face, clipped])[1], 1 / 1.7, atol=0.01)
@@ -51,9 +51,9 @@ def test_white_and_black_are_not_compared(layout, face):
 
 
 def test_evened_ones_look_alike_and_others_stay_as_they_are(layout, face):
-    darker = replace(face, name="b", photo=brightened(face.photo, 1 / GAIN))
-    alike = replace(face, name="c", photo=brightened(face.photo, np.full(3, 1.02)))
-    found = evened(layout, (face, darker, alike))
+    darker = replace(face, name="b", photo=apply_gain(face.photo, 1 / GAIN))
+    alike = replace(face, name="c", photo=apply_gain(face.photo, np.full(3, 1.02)))
+    found = equalize_exposure(layout, (face, darker, alike))
     assert np.abs(found[1].photo.astype(int) - face.photo).max() <= 2
     assert found[0] is face
     assert found[2] is alike

@@ -1,4 +1,4 @@
-"""Head motion undone ([Zhang 2006] sec. 12)."""
+"""Head motion compensated ([Zhang 2006] sec. 12)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 from mien.errors import EstimationError, InputError
 from mien.numeric.planar_similarity import PlanarMotion
-from mien.synthesis.examples.head_alignment import compensated
+from mien.synthesis.examples.head_alignment import align_to_neutral
 
 TRUE = PlanarMotion(np.array(1.1), np.array(-0.3), np.array([40.0, -12.0]))
 
@@ -18,7 +18,7 @@ def neutral(rng):
 
 
 def test_a_moved_neutral_face_is_the_neutral_face(neutral):
-    geometry, _ = compensated(TRUE(neutral), neutral)
+    geometry, _ = align_to_neutral(TRUE(neutral), neutral)
     np.testing.assert_allclose(geometry, neutral)
 
 
@@ -30,30 +30,30 @@ def test_expressions_that_no_motion_explains_stay(rng, neutral):
     basis = np.linalg.qr(np.stack([part.ravel() for part in rigid], axis=1))[0]
     change = rng.normal(size=40)
     expression = neutral + (change - basis @ (basis.T @ change)).reshape(20, 2)
-    geometry, _ = compensated(TRUE(expression), neutral)
+    geometry, _ = align_to_neutral(TRUE(expression), neutral)
     np.testing.assert_allclose(geometry, expression)
 
 
 def test_a_batch_is_its_parts(rng, neutral):
     points = TRUE(neutral) + rng.normal(size=(3, 2, 20, 2))
-    geometries, motion = compensated(points, neutral)
+    geometries, motion = align_to_neutral(points, neutral)
     assert geometries.shape == points.shape
     assert motion.a.shape == (3, 2)
-    np.testing.assert_allclose(geometries[2, 1], compensated(points[2, 1], neutral)[0])
+    np.testing.assert_allclose(geometries[2, 1], align_to_neutral(points[2, 1], neutral)[0])
     np.testing.assert_allclose(motion(geometries), points)
 
 
-def test_points_that_tell_nothing_of_the_motion_may_do_as_they_like(rng, neutral):
+def test_points_outside_of_the_subset_do_not_change_the_motion(rng, neutral):
     still = np.array([1, 4, 9])
     expression = neutral + rng.normal(size=neutral.shape)
     expression[still] = neutral[still]
-    geometry, motion = compensated(TRUE(expression), neutral, by=still)
+    geometry, motion = align_to_neutral(TRUE(expression), neutral, subset=still)
     assert motion.a == pytest.approx(1.1)
     np.testing.assert_allclose(geometry, expression)
 
 
 def test_two_points_suffice(neutral):
-    geometry, _ = compensated(TRUE(neutral[:2]), neutral[:2])
+    geometry, _ = align_to_neutral(TRUE(neutral[:2]), neutral[:2])
     np.testing.assert_allclose(geometry, neutral[:2])
 
 
@@ -68,11 +68,11 @@ def test_two_points_suffice(neutral):
 )
 def test_bad_input_is_named(points, neutral, message):
     with pytest.raises(InputError, match=message):
-        compensated(points, neutral)
+        align_to_neutral(points, neutral)
 
 
-def test_points_in_one_place_tell_of_no_motion(neutral):
+def test_points_in_one_place_determine_no_motion(neutral):
     with pytest.raises(EstimationError, match="those at rest share a place"):
-        compensated(neutral, np.full((20, 2), 7.0))
+        align_to_neutral(neutral, np.full((20, 2), 7.0))
     with pytest.raises(EstimationError, match="those that moved share a place"):
-        compensated(np.full((20, 2), 7.0), neutral)
+        align_to_neutral(np.full((20, 2), 7.0), neutral)

@@ -13,7 +13,7 @@ import mien.assets
 from mien.assets.feature_points import load_feature_layout
 from mien.capture.faces.detector import LandmarkDetector
 from mien.errors import InputError
-from mien.synthesis.examples.landmark_averaging import steady_points
+from mien.synthesis.examples.landmark_averaging import averaged_points
 
 LAYOUT = load_feature_layout()
 JAMES = Path(mien.assets.__file__).parent / "data" / "james" / "photo_left.png"
@@ -31,7 +31,7 @@ def seen(photo):
     with LandmarkDetector() as detector:
         landmarks = [detector.detect_fast(image).points[:, :2] for image in (photo, mirrored)]
         points = [
-            steady_points(LAYOUT, detector, image, found)
+            averaged_points(LAYOUT, detector, image, found)
             for image, found in zip((photo, mirrored), landmarks, strict=True)
         ]
     return landmarks, points
@@ -63,7 +63,7 @@ def _detector(sight):
 
 def test_a_face_that_is_not_found_again_stays(seen, photo):
     landmarks = seen[0][0]
-    points = steady_points(LAYOUT, _detector(None), photo, landmarks)
+    points = averaged_points(LAYOUT, _detector(None), photo, landmarks)
     np.testing.assert_array_equal(points, LAYOUT.from_landmarks(landmarks))
 
 
@@ -87,7 +87,7 @@ def test_points_of_a_large_picture_are_not_shifted(seen):
         to_view = np.linalg.solve(np.column_stack([marks, np.ones(3)]), found)
         return SimpleNamespace(points=np.column_stack([landmarks, np.ones(478)]) @ to_view)
 
-    points = steady_points(LAYOUT, SimpleNamespace(detect_fast=look), picture, landmarks)
+    points = averaged_points(LAYOUT, SimpleNamespace(detect_fast=look), picture, landmarks)
     assert len(looks) == 6
     np.testing.assert_allclose(points, LAYOUT.from_landmarks(landmarks), atol=0.1)
 
@@ -95,15 +95,15 @@ def test_points_of_a_large_picture_are_not_shifted(seen):
 def test_another_face_has_no_say(seen, photo):
     landmarks = seen[0][0]
     stranger = SimpleNamespace(points=np.zeros((478, 3)))
-    points = steady_points(LAYOUT, _detector(stranger), photo, landmarks)
+    points = averaged_points(LAYOUT, _detector(stranger), photo, landmarks)
     np.testing.assert_array_equal(points, LAYOUT.from_landmarks(landmarks))
 
 
 def test_bad_landmarks(photo):
     with pytest.raises(InputError, match="landmarks"):
-        steady_points(LAYOUT, _detector(None), photo, np.zeros((468, 2)))
+        averaged_points(LAYOUT, _detector(None), photo, np.zeros((468, 2)))
 
 
 def test_landmarks_in_one_place(photo):
     with pytest.raises(InputError, match="landmarks: expected a face with a width"):
-        steady_points(LAYOUT, _detector(None), photo, np.ones((478, 2)))
+        averaged_points(LAYOUT, _detector(None), photo, np.ones((478, 2)))

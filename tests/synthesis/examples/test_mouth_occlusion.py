@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mien.assets.feature_points import load_feature_layout
-from mien.synthesis.examples.mouth_occlusion import LipColours
+from mien.synthesis.examples.mouth_occlusion import LipContrast
 
 SKIN, LIPS, HAND = (200, 160, 140), (150, 80, 80), (205, 162, 138)
 
@@ -33,7 +33,7 @@ def face(layout, *, hand=False):
 
 
 def seen(layout, hands):
-    lips = LipColours(layout)
+    lips = LipContrast(layout)
     for hand in hands:
         lips(*face(layout, hand=hand))
     return lips

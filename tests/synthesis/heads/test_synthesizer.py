@@ -11,13 +11,13 @@ from mien.head import NEUTRAL, Expression
 from mien.render.morph import MorphRenderer
 from mien.render.orbit import orbit_camera
 from mien.rig.gaze import with_turned_eyes
-from mien.synthesis.heads.points import feature_points_on
+from mien.synthesis.heads.feature_points import feature_points_on
 from mien.synthesis.heads.synthesizer import HeadSynthesizer
 from mien.synthesis.synthesizer import SynthesisOptions
 from posable import NAMES, REST, head, head_of, shapes
 
 HEAD = HeadSynthesizer(head())
-PLAIN = HeadSynthesizer(head(), SynthesisOptions.paper(), reach=False, rig=HEAD.rig)
+PLAIN = HeadSynthesizer(head(), SynthesisOptions.paper(), warp=False, rig=HEAD.rig)
 LAYOUT = HEAD.layout
 
 
@@ -97,11 +97,13 @@ def test_eyes_look_where_their_pupils_are():
     np.testing.assert_allclose(feature_points_on(face.vertices)[pupils], points[pupils], atol=0.1)
 
 
-def test_some_points_tell_all():
+def test_some_points_determine_all():
     known = np.flatnonzero(named("left_mouth_corner", "left_upper_lip", "left_lower_lip"))
     completed = HEAD.complete(known, points_of("joy")[known])
     np.testing.assert_array_equal(completed[known], points_of("joy")[known])
     still, moved = points_of(NEUTRAL), points_of("joy")
+    by_name = {name: points_of("joy")[LAYOUT.index(name)] for name in np.array(LAYOUT.names)[known]}
+    np.testing.assert_array_equal(HEAD.complete(by_name), completed)
     left = np.abs(completed - moved).max()
     assert left < 0.5 * np.abs(still - moved).max()
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hull import hull_distances
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import Subregions, default_subregions
 from mien.errors import InputError
@@ -16,9 +17,8 @@ from mien.synthesis.inference.coefficients import (
     BROWS,
     UPPER_FACE,
     coefficients,
-    coefficients_of,
-    distances_of,
-    hull_distances,
+    coefficients_from_offsets,
+    mixture_distances,
 )
 
 PHOTO = np.zeros((30, 20, 3), np.uint8)
@@ -120,33 +120,33 @@ def test_a_negative_slack(example_set):
         coefficients(example_set, example_set.neutral.points, slack=-1.0)
 
 
-def test_subregions_together_have_the_same_shares(example_set):
+def test_tied_subregions_have_the_same_coefficients(example_set):
     points = np.array(example_set.neutral.points)
     half = example_set.subregions.members[0]
     points[half] = example_set.examples[2].points[half]
-    apart = coefficients(example_set, points)
-    shares = coefficients(example_set, points, together=[("right", "left")])
-    assert np.abs(apart[0] - apart[1]).max() > 0.1
+    offsets = coefficients(example_set, points)
+    shares = coefficients(example_set, points, tied=[("right", "left")])
+    assert np.abs(offsets[0] - offsets[1]).max() > 0.1
     np.testing.assert_array_equal(shares[0], shares[1])
     np.testing.assert_allclose(shares.sum(axis=1), 1, atol=1e-9)
 
 
 def test_a_group_of_one_changes_nothing(example_set, rng):
     points = example_set.neutral.points + 9 * rng.normal(size=example_set.neutral.points.shape)
-    alone = coefficients(example_set, points, together=[("left",)])
+    alone = coefficients(example_set, points, tied=[("left",)])
     np.testing.assert_allclose(alone, coefficients(example_set, points))
 
 
 @pytest.mark.parametrize(
-    ("together", "message"),
+    ("tied", "message"),
     [
-        ([("ear",)], "together: expected subregions of right, left, got ear"),
+        ([("ear",)], "tied: expected subregions of right, left, got ear"),
         ([("left",), ("right", "left")], "each subregion in one group, got left twice"),
     ],
 )
-def test_bad_groups(example_set, together, message):
+def test_bad_groups(example_set, tied, message):
     with pytest.raises(InputError, match=message):
-        coefficients(example_set, example_set.neutral.points, together=together)
+        coefficients(example_set, example_set.neutral.points, tied=tied)
 
 
 def test_the_upper_face_is_of_the_subregions_that_ship():
@@ -155,7 +155,7 @@ def test_the_upper_face_is_of_the_subregions_that_ship():
     assert set(BROWS) < set(UPPER_FACE) < set(drawn.names)
 
 
-def test_the_brows_go_together_unless_told_otherwise(example_set, rng):
+def test_the_brows_are_tied_by_default(example_set, rng):
     names = (*BROWS, "nose")
     members = np.array_split(np.arange(len(example_set.layout.names)), len(names))
     parted = replace(
@@ -164,10 +164,10 @@ def test_the_brows_go_together_unless_told_otherwise(example_set, rng):
     )
     points = example_set.neutral.points + 9 * rng.normal(size=example_set.neutral.points.shape)
     shares = coefficients(parted, points)
-    np.testing.assert_array_equal(shares, coefficients(parted, points, together=[BROWS]))
+    np.testing.assert_array_equal(shares, coefficients(parted, points, tied=[BROWS]))
     assert (shares[:3] == shares[0]).all()
     assert np.abs(shares[3] - shares[0]).max() > 0.1
-    assert np.abs(np.diff(coefficients(parted, points, together=())[:3], axis=0)).max() > 0.1
+    assert np.abs(np.diff(coefficients(parted, points, tied=())[:3], axis=0)).max() > 0.1
 
 
 @pytest.fixture(scope="module")
@@ -200,23 +200,25 @@ def test_a_mouth_that_opens_gets_its_teeth_without_a_jump(with_teeth):
     assert np.abs(np.diff(found, axis=0)).sum(axis=1).max() < 0.05
 
 
-def test_teeth_that_are_together_with_others_are_made_from_all(with_teeth):
+def test_teeth_tied_to_others_are_made_from_all(with_teeth):
     points = 0.6 * with_teeth.geometries[1] + 0.4 * with_teeth.geometries[4]
-    shares = coefficients(with_teeth, points, together=[("skin", "teeth")])
+    shares = coefficients(with_teeth, points, tied=[("skin", "teeth")])
     assert shares[1, 4] > 0.1
 
 
-def test_geometries_in_space_are_mixed_likewise(example_set, rng):
+def test_geometries_in_space_are_mixed_alike(example_set, rng):
     examples = rng.normal(size=(5, len(example_set.layout.names), 3))
     truth = np.array([0.1, 0.5, 0.0, 0.4, 0.0])
-    apart = examples - np.tensordot(truth, examples, axes=1)
-    shares = coefficients_of(apart, example_set.subregions, distance_penalty=0.0)
+    offsets = examples - np.tensordot(truth, examples, axes=1)
+    shares = coefficients_from_offsets(offsets, example_set.subregions, distance_penalty=0.0)
     np.testing.assert_allclose(shares, np.tile(truth, (2, 1)), atol=1e-5)
-    np.testing.assert_allclose(distances_of(apart, shares, example_set.subregions), 0, atol=1e-4)
+    np.testing.assert_allclose(
+        mixture_distances(offsets, shares, example_set.subregions), 0, atol=1e-4
+    )
 
 
 def test_distances_are_of_the_points(example_set):
-    apart = np.zeros((1, len(example_set.layout.names), 3))
-    apart[0, example_set.subregions.members[1]] = [0.0, 3.0, 4.0]
-    found = distances_of(apart, np.ones((2, 1)), example_set.subregions)
+    offsets = np.zeros((1, len(example_set.layout.names), 3))
+    offsets[0, example_set.subregions.members[1]] = [0.0, 3.0, 4.0]
+    found = mixture_distances(offsets, np.ones((2, 1)), example_set.subregions)
     np.testing.assert_allclose(found, [0, 5])

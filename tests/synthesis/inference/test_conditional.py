@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mien.errors import InputError
-from mien.synthesis.inference.conditional import ConditionalMotion
-from mien.synthesis.inference.propagation import Propagation
+from mien.synthesis.inference.conditional import ConditionalGaussian
+from mien.synthesis.inference.propagation import MotionPropagation
 from moving import LAYOUT, POINTS, expressions
 
 KNOWN = np.array([0, 3, 6, 9, 11, 14, 17, 20, 22])
@@ -17,7 +17,7 @@ KNOWN = np.array([0, 3, 6, 9, 11, 14, 17, 20, 22])
 
 def test_an_expression_in_the_subspace_is_found_from_some_points(rng):
     statistics = expressions(rng)
-    motion = ConditionalMotion(statistics, components=4, least_noise=1e-6)
+    motion = ConditionalGaussian(statistics, components=4, min_noise=1e-6)
     found = motion.infer(KNOWN, statistics[3, KNOWN])
     np.testing.assert_allclose(found.displacements, statistics[3], atol=1e-6)
     assert found.iterations == 1
@@ -25,13 +25,13 @@ def test_an_expression_in_the_subspace_is_found_from_some_points(rng):
 
 def test_all_points_known_reproduce_themselves(rng):
     statistics = expressions(rng)
-    found = ConditionalMotion(statistics).infer(np.arange(POINTS), statistics[3])
+    found = ConditionalGaussian(statistics).infer(np.arange(POINTS), statistics[3])
     np.testing.assert_allclose(found.displacements, statistics[3], atol=0.01)
 
 
 def test_is_the_conditional_mean_of_the_normal_distribution(rng):
     statistics = expressions(rng, 6, noise=1.0)
-    motion = ConditionalMotion(statistics, components=5)
+    motion = ConditionalGaussian(statistics, components=5)
     given = statistics[0, KNOWN] + rng.normal(size=(len(KNOWN), 2))
     flat = statistics.reshape(len(statistics), -1)
     values, vectors = np.linalg.eigh(np.cov(flat.T))
@@ -47,11 +47,11 @@ def test_is_the_conditional_mean_of_the_normal_distribution(rng):
 def test_what_is_usual_is_expected_when_the_usual_is_given(rng):
     statistics = expressions(rng, noise=1.0)
     mean = statistics.mean(axis=0)
-    found = ConditionalMotion(statistics).infer(KNOWN, mean[KNOWN])
+    found = ConditionalGaussian(statistics).infer(KNOWN, mean[KNOWN])
     np.testing.assert_allclose(found.displacements, mean, atol=1e-9)
 
 
-@pytest.mark.parametrize("way", [ConditionalMotion, lambda rows: Propagation(LAYOUT, rows)])
+@pytest.mark.parametrize("way", [ConditionalGaussian, lambda rows: MotionPropagation(LAYOUT, rows)])
 def test_where_no_expression_was_seen_all_is_at_rest(way, rng):
     rest = np.tile(rng.normal(size=(POINTS, 2)), (3, 1, 1))
     found = way(rest).infer(KNOWN, rest[0, KNOWN] + 2)
@@ -63,9 +63,11 @@ def test_propagation_in_one_set_with_prior_comes_to_the_same(rng):
     given = statistics[0, KNOWN] + rng.normal(size=(len(KNOWN), 2))
     one = SimpleNamespace(sets=LAYOUT.sets[:1])
     patient = {"threshold": 1e-9, "max_iterations": 3000}
-    expected = ConditionalMotion(statistics, components=5).infer(KNOWN, given)
-    for trust in (0.0, 10.0):
-        propagation = Propagation(one, statistics, components=5, trust=trust, prior=1, **patient)
+    expected = ConditionalGaussian(statistics, components=5).infer(KNOWN, given)
+    for weight in (0.0, 10.0):
+        propagation = MotionPropagation(
+            one, statistics, components=5, known_weight=weight, prior_weight=1, **patient
+        )
         found = propagation.infer(KNOWN, given)
         np.testing.assert_allclose(found.displacements, expected.displacements, atol=1e-5)
         np.testing.assert_allclose(found.errors[-1], expected.errors[0], atol=1e-5)
@@ -74,7 +76,7 @@ def test_propagation_in_one_set_with_prior_comes_to_the_same(rng):
 def test_the_order_of_the_known_points_is_all_one(rng):
     statistics = expressions(rng, noise=0.5)
     order = rng.permutation(len(KNOWN))
-    motion, given = ConditionalMotion(statistics), statistics[0, KNOWN]
+    motion, given = ConditionalGaussian(statistics), statistics[0, KNOWN]
     np.testing.assert_array_equal(
         motion.infer(KNOWN[order], given[order]).displacements,
         motion.infer(KNOWN, given).displacements,
@@ -82,16 +84,16 @@ def test_the_order_of_the_known_points_is_all_one(rng):
 
 
 def test_bad_input_is_named(rng):
-    motion = ConditionalMotion(expressions(rng))
+    motion = ConditionalGaussian(expressions(rng))
     with pytest.raises(InputError, match="known: expected points from 0 to 23, got 24"):
         motion.infer([24], np.zeros((1, 2)))
     with pytest.raises(InputError, match="displacements: expected finite numbers"):
         motion.infer([2], [[np.nan, 0]])
     with pytest.raises(InputError, match="statistics: expected 2 expressions or more"):
-        ConditionalMotion(np.zeros((1, 5, 2)))
+        ConditionalGaussian(np.zeros((1, 5, 2)))
     with pytest.raises(InputError, match="statistics: expected at least one point"):
-        ConditionalMotion(np.zeros((3, 0, 2)))
-    with pytest.raises(InputError, match="least_noise: expected a number above zero"):
-        ConditionalMotion(expressions(rng), least_noise=0)
+        ConditionalGaussian(np.zeros((3, 0, 2)))
+    with pytest.raises(InputError, match="min_noise: expected a number above zero"):
+        ConditionalGaussian(expressions(rng), min_noise=0)
     with pytest.raises(InputError, match="components: expected a number from 1 on"):
-        ConditionalMotion(expressions(rng), components=0)
+        ConditionalGaussian(expressions(rng), components=0)

@@ -13,12 +13,12 @@ from mien.errors import EstimationError, InputError
 from mien.numeric.planar_similarity import PlanarMotion
 from mien.synthesis.examples.example_set import Example, ExampleSet
 from mien.synthesis.inference.input_checks import (
-    ENOUGH_STATISTICS,
-    STRANGER,
+    MIN_STATISTICS,
+    OUTLIER_RMS,
     face_width,
     head_moved,
     look_mirrored,
-    oddness,
+    mahalanobis_rms,
 )
 
 WIDTH, HEIGHT = 160, 200
@@ -119,18 +119,22 @@ def test_a_head_that_moves_with_its_expression_has_moved(layout, example_set, co
 def test_the_person_is_usual_and_another_one_is_odd(layout, example_set):
     neutral = example_set.neutral.points
     own = expression(layout, neutral, [1, -1, 0.5, 1, 0, 1])
-    assert oddness(example_set, own) < STRANGER / 2
-    assert oddness(example_set, MOVED(own)) == pytest.approx(oddness(example_set, own), rel=1e-6)
+    assert mahalanobis_rms(example_set, own) < OUTLIER_RMS / 2
+    assert mahalanobis_rms(example_set, MOVED(own)) == pytest.approx(
+        mahalanobis_rms(example_set, own), rel=1e-6
+    )
     nose = [i for i, name in enumerate(layout.names) if "nose" in name]
     wider = own.copy()
     wider[nose, 0] += 0.4 * (wider[nose, 0] - neutral[:, 0].mean())
     longer = own * [1, 1.1]
-    assert min(oddness(example_set, wider), oddness(example_set, longer)) > STRANGER
+    assert (
+        min(mahalanobis_rms(example_set, wider), mahalanobis_rms(example_set, longer)) > OUTLIER_RMS
+    )
 
 
 def test_a_few_expressions_do_not_tell_what_is_odd(example_set):
-    few = replace(example_set, statistics=example_set.statistics[: ENOUGH_STATISTICS - 1])
-    assert oddness(few, few.neutral.points) is None
+    few = replace(example_set, statistics=example_set.statistics[: MIN_STATISTICS - 1])
+    assert mahalanobis_rms(few, few.neutral.points) is None
 
 
 def test_real_people_are_told_apart(shared, layout):
@@ -153,6 +157,6 @@ def test_real_people_are_told_apart(shared, layout):
     examples = (Example("neutral", photo, found[0], ""),)
     seen = ExampleSet(layout, examples, 0, np.stack(found[::2]), subregions)
     seen = replace(seen, statistics=seen.geometry(seen.statistics))
-    own = np.array([oddness(seen, points) for points in found[1::2]])
-    assert (own < STRANGER).mean() > 0.85
-    assert min(oddness(seen, points) for points in others) > STRANGER
+    own = np.array([mahalanobis_rms(seen, points) for points in found[1::2]])
+    assert (own < OUTLIER_RMS).mean() > 0.85
+    assert min(mahalanobis_rms(seen, points) for points in others) > OUTLIER_RMS

@@ -11,8 +11,8 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.errors import InputError
 from mien.numeric.pca import fit_pca
-from mien.synthesis.inference.conditional import ConditionalMotion
-from mien.synthesis.inference.propagation import Propagation, visiting_order
+from mien.synthesis.inference.conditional import ConditionalGaussian
+from mien.synthesis.inference.propagation import MotionPropagation, visiting_order
 from moving import LAYOUT, POINTS, expressions
 
 KNOWN = np.array([0, 3, 6, 9, 11, 14, 17, 20, 22])
@@ -48,7 +48,7 @@ def as_printed(statistics, sets, count, known, given, iterations):
 def test_is_what_the_paper_prints(rng):
     statistics = expressions(rng, 6, noise=0.5)
     given = expressions(rng)[0, KNOWN]
-    found = Propagation(LAYOUT, statistics, components=3, threshold=1e-12, max_iterations=7)
+    found = MotionPropagation(LAYOUT, statistics, components=3, threshold=1e-12, max_iterations=7)
     np.testing.assert_allclose(
         found.infer(KNOWN, given).displacements,
         as_printed(statistics, LAYOUT.sets, 3, KNOWN, given, 7),
@@ -59,57 +59,65 @@ def test_is_what_the_paper_prints(rng):
 def test_an_expression_in_the_subspace_is_found_from_some_points(rng):
     statistics = expressions(rng)
     for truth in statistics[:3]:
-        found = Propagation(LAYOUT, statistics, components=4, **PATIENT).infer(KNOWN, truth[KNOWN])
+        found = MotionPropagation(LAYOUT, statistics, components=4, **PATIENT).infer(
+            KNOWN, truth[KNOWN]
+        )
         np.testing.assert_allclose(found.displacements, truth, atol=1e-4)
 
 
 def test_all_points_known_reproduce_themselves_at_once(rng):
     statistics = expressions(rng)
-    found = Propagation(LAYOUT, statistics, components=4).infer(np.arange(POINTS), statistics[5])
+    found = MotionPropagation(LAYOUT, statistics, components=4).infer(
+        np.arange(POINTS), statistics[5]
+    )
     np.testing.assert_allclose(found.displacements, statistics[5], atol=1e-9)
     assert found.errors[0] == pytest.approx(0, abs=1e-9)
 
 
-def test_points_nearly_trusted_alone_are_found_in_few_iterations(rng):
+def test_a_large_weight_of_known_points_needs_few_iterations(rng):
     statistics = expressions(rng)
     truth = statistics[7]
-    found = Propagation(LAYOUT, statistics, components=4, trust=100).infer(KNOWN, truth[KNOWN])
+    found = MotionPropagation(LAYOUT, statistics, components=4, known_weight=100).infer(
+        KNOWN, truth[KNOWN]
+    )
     np.testing.assert_allclose(found.displacements, truth, atol=0.05)
-    printed = Propagation(LAYOUT, statistics, components=4, threshold=1e-9, max_iterations=5)
+    printed = MotionPropagation(LAYOUT, statistics, components=4, threshold=1e-9, max_iterations=5)
     slower = printed.infer(KNOWN, truth[KNOWN]).displacements
     assert np.abs(slower - truth).max() > 1
 
 
-def test_trust_changes_nothing_where_all_points_are_known(rng):
+def test_the_weight_of_known_points_changes_nothing_where_all_are_known(rng):
     statistics = expressions(rng, 6, noise=0.5)
     given = 3 * statistics[0]
     found = [
-        Propagation(LAYOUT, statistics, components=3, trust=trust).infer(np.arange(POINTS), given)
-        for trust in (0.0, 1.0)
+        MotionPropagation(LAYOUT, statistics, components=3, known_weight=weight).infer(
+            np.arange(POINTS), given
+        )
+        for weight in (0.0, 1.0)
     ]
     np.testing.assert_allclose(found[0].displacements, found[1].displacements)
 
 
-def test_a_prior_keeps_nearer_to_what_is_usual(rng):
+def test_a_prior_shrinks_displacements_towards_the_mean(rng):
     statistics = expressions(rng, noise=1.0)
     given = 5 * statistics[0, KNOWN]
     spans = [
         np.abs(
-            Propagation(LAYOUT, statistics, components=4, prior=prior, **PATIENT)
+            MotionPropagation(LAYOUT, statistics, components=4, prior_weight=weight, **PATIENT)
             .infer(KNOWN, given)
             .displacements
         ).sum()
-        for prior in (0.0, 1.0, 10.0)
+        for weight in (0.0, 1.0, 10.0)
     ]
     assert spans[0] > spans[1] > spans[2]
 
 
-@pytest.mark.parametrize("options", [{}, {"trust": 10.0, "prior": 1.0}])
-def test_the_order_of_the_known_points_is_all_one(rng, options):
+@pytest.mark.parametrize("options", [{}, {"known_weight": 10.0, "prior_weight": 1.0}])
+def test_the_order_of_the_known_points_does_not_matter(rng, options):
     statistics = expressions(rng, noise=0.5)
     order = rng.permutation(len(KNOWN))
     given = statistics[0, KNOWN]
-    propagation = Propagation(LAYOUT, statistics, components=4, **options)
+    propagation = MotionPropagation(LAYOUT, statistics, components=4, **options)
     np.testing.assert_array_equal(
         propagation.infer(KNOWN[order], given[order]).displacements,
         propagation.infer(KNOWN, given).displacements,
@@ -121,7 +129,7 @@ def test_stops_when_two_iterations_changed_little(rng):
     given = statistics[0, KNOWN]
 
     def after(iterations, threshold=1e-12):
-        limited = Propagation(
+        limited = MotionPropagation(
             LAYOUT, statistics, components=4, threshold=threshold, max_iterations=iterations
         )
         return limited.infer(KNOWN, given)
@@ -138,24 +146,26 @@ def test_stops_when_two_iterations_changed_little(rng):
 
 def test_stops_at_the_last_iteration_allowed(rng):
     statistics = expressions(rng, 6, noise=0.5)
-    found = Propagation(LAYOUT, statistics, threshold=1e-12, max_iterations=9)
+    found = MotionPropagation(LAYOUT, statistics, threshold=1e-12, max_iterations=9)
     assert found.infer(KNOWN, statistics[0, KNOWN]).iterations == 9
 
 
 def test_one_point_that_does_not_move_is_enough_input(rng):
-    found = Propagation(LAYOUT, expressions(rng)).infer(np.array([4]), np.zeros((1, 2)))
+    found = MotionPropagation(LAYOUT, expressions(rng)).infer(np.array([4]), np.zeros((1, 2)))
     assert np.isfinite(found.displacements).all()
 
 
-def test_sets_that_are_not_joined_stay(rng):
-    apart = SimpleNamespace(sets=((np.arange(12),), (np.arange(8, 16),), (np.arange(18, 24),)))
+def test_points_of_unreached_sets_do_not_move(rng):
+    separate = SimpleNamespace(sets=((np.arange(12),), (np.arange(8, 16),), (np.arange(18, 24),)))
     statistics = expressions(rng)
-    found = Propagation(apart, statistics, components=4).infer(np.array([2]), np.ones((1, 2)))
+    found = MotionPropagation(separate, statistics, components=4).infer(
+        np.array([2]), np.ones((1, 2))
+    )
     np.testing.assert_array_equal(found.displacements[16:], 0)
     assert np.abs(found.displacements[12:16]).min() > 0
 
 
-def test_the_lowest_hierarchy_that_knows_a_point_begins():
+def test_the_first_hierarchy_with_a_known_point_is_visited_first():
     sets = LAYOUT.sets
     without_whole = ((np.array([0, 1]),), *sets[1:])
     assert visiting_order(sets, np.array([23]))[0] == (0, 0)
@@ -190,13 +200,13 @@ def test_the_layout_that_ships_reaches_all_sets_from_any_point():
 )
 def test_bad_points_are_named(rng, known, displacements, message):
     with pytest.raises(InputError, match=message):
-        Propagation(LAYOUT, expressions(rng)).infer(known, displacements)
+        MotionPropagation(LAYOUT, expressions(rng)).infer(known, displacements)
 
 
-def test_points_in_no_set_tell_nothing(rng):
+def test_known_points_in_no_set_are_refused(rng):
     few = SimpleNamespace(sets=((np.arange(12),),))
     with pytest.raises(InputError, match="known: expected a point that belongs to a set"):
-        Propagation(few, expressions(rng), components=4).infer([20], np.ones((1, 2)))
+        MotionPropagation(few, expressions(rng), components=4).infer([20], np.ones((1, 2)))
 
 
 @pytest.mark.parametrize(
@@ -204,16 +214,16 @@ def test_points_in_no_set_tell_nothing(rng):
     [
         ({"components": 0}, "components: expected a number from 1 on"),
         ({"components": (3, 3)}, "components: expected one number, or 3"),
-        ({"trust": -1}, "trust: expected a number of 0 or more"),
-        ({"prior": -1}, "prior: expected a number of 0 or more"),
-        ({"prior": np.nan}, "prior: expected finite numbers"),
+        ({"known_weight": -1}, "known_weight: expected a number of 0 or more"),
+        ({"prior_weight": -1}, "prior_weight: expected a number of 0 or more"),
+        ({"prior_weight": np.nan}, "prior_weight: expected finite numbers"),
         ({"threshold": 0}, "threshold: expected a number above zero"),
         ({"max_iterations": 0}, "max_iterations: expected a number from 1 on"),
     ],
 )
 def test_bad_options_are_named(rng, options, message):
     with pytest.raises(InputError, match=message):
-        Propagation(LAYOUT, expressions(rng), **options)
+        MotionPropagation(LAYOUT, expressions(rng), **options)
 
 
 @pytest.mark.parametrize(
@@ -227,25 +237,25 @@ def test_bad_options_are_named(rng, options, message):
 )
 def test_bad_statistics_are_named(statistics, message):
     with pytest.raises(InputError, match=message):
-        Propagation(LAYOUT, statistics)
+        MotionPropagation(LAYOUT, statistics)
 
 
 def test_a_layout_without_sets_is_refused(rng):
     with pytest.raises(InputError, match="layout: expected at least one set"):
-        Propagation(SimpleNamespace(sets=()), expressions(rng), components=4)
+        MotionPropagation(SimpleNamespace(sets=()), expressions(rng), components=4)
 
 
 @pytest.mark.parametrize(
-    "way",
+    "model",
     [
-        lambda statistics: ConditionalMotion(statistics, components=4, least_noise=1e-6),
-        lambda statistics: Propagation(LAYOUT, statistics, components=4, **PATIENT),
+        lambda statistics: ConditionalGaussian(statistics, components=4, min_noise=1e-6),
+        lambda statistics: MotionPropagation(LAYOUT, statistics, components=4, **PATIENT),
     ],
 )
-def test_points_in_space_are_found_likewise(rng, way):
+def test_points_in_space_are_found_likewise(rng, model):
     """The flat expressions, turned in space, are found as they are in the plane."""
     statistics = expressions(rng) @ np.linalg.qr(rng.normal(size=(3, 3)))[0][:2]
-    found = way(statistics).infer(KNOWN, statistics[3, KNOWN])
+    found = model(statistics).infer(KNOWN, statistics[3, KNOWN])
     np.testing.assert_allclose(found.displacements, statistics[3], atol=1e-5)
     with pytest.raises(InputError, match=r"displacements: expected shape \(1, 3\)"):
-        way(statistics).infer([0], np.zeros((1, 2)))
+        model(statistics).infer([0], np.zeros((1, 2)))

@@ -1,4 +1,4 @@
-"""Bends are smooth, and no larger than what is given needs."""
+"""The residual process is smooth, and no larger than the given displacements need."""
 
 from __future__ import annotations
 
@@ -6,59 +6,59 @@ import numpy as np
 import pytest
 
 from mien.errors import InputError
-from mien.synthesis.inference.conditional import MOST_DEVIATIONS, ConditionalMotion
-from mien.synthesis.inference.residual_process import closeness, least_bend
+from mien.synthesis.inference.conditional import MAX_RMS_DEVIATIONS, ConditionalGaussian
+from mien.synthesis.inference.residual_process import matern32, smallest_variance
 
 
 def row_of_points(count):
-    """Places along a line one face width long."""
+    """Points along a line one face width long."""
     return np.column_stack([np.linspace(0, 1, count), np.zeros(count)])
 
 
-def test_points_bend_together_the_nearer_the_more():
-    near = closeness(row_of_points(30))
-    np.testing.assert_allclose(np.diag(near), 1)
-    np.testing.assert_allclose(near, near.T)
-    assert (np.diff(near[0]) < 0).all()
-    assert near[0, -1] < 0.01
-    assert np.linalg.eigvalsh(near).min() > 0
-    with pytest.raises(InputError, match="places: expected finite numbers"):
-        closeness(np.array([[0, np.nan]]))
+def test_the_correlation_falls_with_the_distance():
+    correlation = matern32(row_of_points(30))
+    np.testing.assert_allclose(np.diag(correlation), 1)
+    np.testing.assert_allclose(correlation, correlation.T)
+    assert (np.diff(correlation[0]) < 0).all()
+    assert correlation[0, -1] < 0.01
+    assert np.linalg.eigvalsh(correlation).min() > 0
+    with pytest.raises(InputError, match="points: expected finite numbers"):
+        matern32(np.array([[0, np.nan]]))
 
 
-def test_a_bend_is_as_large_as_it_must_be(rng):
+def test_the_variance_is_as_large_as_it_must_be(rng):
     mixed = rng.normal(size=(6, 6))
-    usual, bend = mixed @ mixed.T + np.eye(6), closeness(rng.uniform(0, 1, (6, 2)))
+    covariance, correlation = mixed @ mixed.T + np.eye(6), matern32(rng.uniform(0, 1, (6, 2)))
     given = rng.normal(size=6) * 40
-    variance, force = least_bend(usual, bend, given, 1.5)
-    total = usual + variance * bend
-    np.testing.assert_allclose(total @ force, given, rtol=1e-6)
+    variance, weights = smallest_variance(covariance, correlation, given, 1.5)
+    total = covariance + variance * correlation
+    np.testing.assert_allclose(total @ weights, given, rtol=1e-6)
     deviations = np.sqrt(given @ np.linalg.solve(total, given) / 6)
     assert deviations == pytest.approx(1.5, rel=1e-6)
 
 
 def stiff(rng):
     """A line of points whose right half moves, 3 px, and whose left half hardly ever does."""
-    places = row_of_points(40)
-    ways = np.sin(np.outer([1, 2, 3], np.pi * places[:, 0]))[..., None] * [0.5, 1]
+    template = row_of_points(40)
+    ways = np.sin(np.outer([1, 2, 3], np.pi * template[:, 0]))[..., None] * [0.5, 1]
     ways[:, :20] *= 0.02
     seen = np.tensordot(rng.normal(0, 3, (80, 3)), ways, axes=1)
-    return places, seen
+    return template, seen
 
 
-def test_what_is_usual_bends_nothing(rng):
-    places, seen = stiff(rng)
+def test_displacements_like_the_statistics_need_no_process(rng):
+    template, seen = stiff(rng)
     known = np.array([3, 25, 33])
-    plain = ConditionalMotion(seen).infer(known, seen[4, known])
-    bending = ConditionalMotion(seen, places=places).infer(known, seen[4, known])
-    np.testing.assert_array_equal(plain.displacements, bending.displacements)
+    plain = ConditionalGaussian(seen).infer(known, seen[4, known])
+    with_process = ConditionalGaussian(seen, template=template).infer(known, seen[4, known])
+    np.testing.assert_array_equal(plain.displacements, with_process.displacements)
 
 
-def test_what_nobody_saw_moves_its_neighbours_and_not_the_rest(rng):
-    places, seen = stiff(rng)
+def test_an_unlikely_displacement_moves_its_neighbours_and_not_the_rest(rng):
+    template, seen = stiff(rng)
     known, given = np.array([8, 30]), np.array([[0.0, 9.0], [0.0, 0.0]])
-    plain = ConditionalMotion(seen).infer(known, given).displacements[:, 1]
-    bent = ConditionalMotion(seen, places=places).infer(known, given).displacements[:, 1]
+    plain = ConditionalGaussian(seen).infer(known, given).displacements[:, 1]
+    bent = ConditionalGaussian(seen, template=template).infer(known, given).displacements[:, 1]
     assert abs(bent[8] - 9) < 0.5
     assert 3 < bent[6] < 9
     assert 3 < bent[10] < 9
@@ -66,26 +66,26 @@ def test_what_nobody_saw_moves_its_neighbours_and_not_the_rest(rng):
     assert np.abs(np.diff(bent)).max() < 3
 
 
-def test_bends_begin_where_the_usual_ends(rng):
+def test_the_process_begins_without_a_jump(rng):
     """Points that are dragged ever farther take the others with them without a jump."""
-    places, seen = stiff(rng)
-    motion, known = ConditionalMotion(seen, places=places), np.array([8, 30])
+    template, seen = stiff(rng)
+    motion, known = ConditionalGaussian(seen, template=template), np.array([8, 30])
     given = np.linspace(0, 3, 301)[:, None, None] * [[0, 1], [0, 0]]
     found = np.stack([motion.infer(known, one).displacements for one in given])
-    plain = ConditionalMotion(seen)
+    plain = ConditionalGaussian(seen)
     expected = np.stack([plain.infer(known, one).displacements for one in given])
     bent = (found != expected).any(axis=(1, 2))
     assert not bent[0]
     assert bent[-1]
-    # No step is larger than those without bends, which are all alike.
+    # No step is larger than those without the process, which are all alike.
     steps = np.abs(np.diff(found, axis=0)).max(axis=(1, 2))
     assert steps.max() < 1.01 * np.abs(np.diff(expected, axis=0)).max()
 
 
 def test_bad_options(rng):
-    places, seen = stiff(rng)
-    with pytest.raises(InputError, match="places: expected shape"):
-        ConditionalMotion(seen, places=places[:5])
-    with pytest.raises(InputError, match="most: expected a number above zero"):
-        ConditionalMotion(seen, places=places, most=0)
-    assert MOST_DEVIATIONS > 1
+    template, seen = stiff(rng)
+    with pytest.raises(InputError, match="template: expected shape"):
+        ConditionalGaussian(seen, template=template[:5])
+    with pytest.raises(InputError, match="max_deviations: expected a number above zero"):
+        ConditionalGaussian(seen, template=template, max_deviations=0)
+    assert MAX_RMS_DEVIATIONS > 1

@@ -8,12 +8,12 @@ import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int, UInt8, frozen
 
-__all__ = ["FADE_UNIT", "FadeMap", "fade_map"]
+__all__ = ["WEIGHT_UNIT", "BlendWeights", "pack_blend_weights"]
 
-FADE_UNIT = 255
+WEIGHT_UNIT = 255
 
 
-class FadeMap(NamedTuple):
+class BlendWeights(NamedTuple):
     """The R subregions and, last, what is around them. Most places have one, few more than three.
 
     Attributes:
@@ -24,7 +24,7 @@ class FadeMap(NamedTuple):
         starts: (S + 1,) where each set begins in `members`.
         members: indices of subregions.
         holds: (S, R + 1) the same as a table.
-        planes: (R + 1, h * w) fades, FADE_UNIT is all; they sum to it.
+        planes: (R + 1, h * w) fades, WEIGHT_UNIT is all; they sum to it.
     """
 
     width: int
@@ -36,7 +36,7 @@ class FadeMap(NamedTuple):
     planes: UInt8[Array, "r+1 n"]
 
 
-def fade_map(fades: Float[Array, "h w r"]) -> FadeMap:
+def pack_blend_weights(fades: Float[Array, "h w r"]) -> BlendWeights:
     """Of subregions' fades, which sum to at most 1."""
     height, width, regions = fades.shape
     planes = _rounded(fades).reshape(-1, regions + 1).T
@@ -50,7 +50,7 @@ def fade_map(fades: Float[Array, "h w r"]) -> FadeMap:
         keys = np.unique(keys * 256 + row, return_inverse=True)[1]
     _, first, codes = np.unique(keys, return_index=True, return_inverse=True)
     holds = near.reshape(regions + 1, -1)[:, first].T
-    return FadeMap(
+    return BlendWeights(
         width,
         height,
         frozen(codes.astype(np.int32)),
@@ -65,8 +65,8 @@ def _rounded(fades: Float[Array, "h w r"]) -> UInt8[Array, "h w r+1"]:
     """With what is around: the greatest takes what rounding leaves."""
     around = np.maximum(1 - fades.sum(2, keepdims=True), 0)
     whole = np.concatenate([fades, around], axis=2)
-    parts = np.floor(whole * FADE_UNIT + 0.5).astype(np.int16)
+    parts = np.floor(whole * WEIGHT_UNIT + 0.5).astype(np.int16)
     greatest = whole.argmax(2, keepdims=True)
-    left = FADE_UNIT - parts.sum(2, keepdims=True, dtype=np.int16)
+    left = WEIGHT_UNIT - parts.sum(2, keepdims=True, dtype=np.int16)
     np.put_along_axis(parts, greatest, np.take_along_axis(parts, greatest, 2) + left, 2)
     return parts.astype(np.uint8)

@@ -12,9 +12,9 @@ from mien.numeric.kernels.threads import for_row_bands
 from mien.numeric.planar_similarity import PlanarMotion, estimate_planar_motion
 from mien.numeric.raster.piecewise_affine import affine_maps, facing, snapped
 from mien.render.mipmap import packed_texels
-from mien.synthesis.composition.blend_weights import fade_map
+from mien.synthesis.composition.blend_weights import pack_blend_weights
+from mien.synthesis.composition.border_padding import pad_with_blurred_border
 from mien.synthesis.composition.composer_kernels import PART, Mixtures, Photos, draw_rows
-from mien.synthesis.composition.surroundings import with_surroundings
 from mien.synthesis.examples.example_set import ExampleSet
 
 __all__ = ["Composer"]
@@ -52,7 +52,7 @@ class Composer:
         around = np.concatenate([layout.template, layout.surround])
         self._triangles = facing(layout.triangles, around)
         self._standard = examples.standard
-        self._fades = fade_map(examples.subregions.fades)
+        self._fades = pack_blend_weights(examples.subregions.fades)
 
     def head_motion(self, points: Float[Array, "n 2"]) -> PlanarMotion:
         """What the head did between the neutral photo and another, from points that are rigid.
@@ -87,7 +87,7 @@ class Composer:
             coefficients: (R, m) shares of the examples in each subregion; rows sum to 1.
             motion: of the head, from the neutral photo to the picture; none unless given.
             size: width and height of the picture; the neutral photo's unless given. Beyond its
-                edges the neutral photo goes on as `with_surroundings` has it.
+                edges the neutral photo goes on as `pad_with_blurred_border` has it.
             out: memory to draw into.
 
         Returns:
@@ -123,7 +123,7 @@ class Composer:
     @cached_property
     def _larger(self) -> tuple[UInt8[Array, "k l 3"], int]:
         """For heads that move: the neutral photo with its surroundings, and by how many px."""
-        return with_surroundings(self._neutral)
+        return pad_with_blurred_border(self._neutral)
 
     def _background(
         self,

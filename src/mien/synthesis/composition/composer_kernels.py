@@ -15,7 +15,7 @@ from mien.arrays import Array, Float, Int
 from mien.numeric.kernels.jit import njit
 from mien.numeric.kernels.prefetch import prefetch
 from mien.numeric.raster.piecewise_affine import SUBPIXELS, cut_row, extents
-from mien.synthesis.composition.blend_weights import FADE_UNIT, FadeMap
+from mien.synthesis.composition.blend_weights import WEIGHT_UNIT, BlendWeights
 
 __all__ = ["PART", "Mixtures", "Photos", "draw_rows"]
 
@@ -72,7 +72,7 @@ def draw_rows(
     maps: Array,
     photos: Photos,
     standard: int,
-    faded: FadeMap,
+    faded: BlendWeights,
     mixtures: Mixtures,
     first: int,
     end: int,
@@ -189,7 +189,7 @@ def _alike(codes: Array, code: int, memory: Array, most: int) -> int:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _weigh(
-    faded: FadeMap,
+    faded: BlendWeights,
     code: int,
     shares: Array,
     used: Array,
@@ -253,7 +253,7 @@ def _bilinear(x: np.uint32, y: np.uint32) -> tuple[np.uint32, np.uint32, np.uint
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fade(memory: Array, count: int, sums: Array) -> None:
     """Fill in how much of each pixel is a subregion's, and take it from the rest."""
-    unit = _Float(1 / (PART * FADE_UNIT))
+    unit = _Float(1 / (PART * WEIGHT_UNIT))
     for k in range(_whole(count)):
         w0, w1, w2, w3 = _bilinear(memory[_X + k], memory[_Y + k])
         fade = _UInt(_UInt(memory[_UPPER_LEFT + k] * w0) + _UInt(memory[_UPPER_RIGHT + k] * w1))

@@ -10,7 +10,7 @@ from mien.arrays import Array, Float, Int, UInt8
 from mien.numeric.raster.rasterizer import Raster, rasterize
 from mien.synthesis.examples.example_set import ExampleSet
 
-__all__ = ["aligned_photos", "warped"]
+__all__ = ["aligned_photos", "warp_to_raster"]
 
 
 def aligned_photos(examples: ExampleSet) -> Iterator[UInt8[Array, "h w 4"]]:
@@ -29,10 +29,10 @@ def aligned_photos(examples: ExampleSet) -> Iterator[UInt8[Array, "h w 4"]]:
     alpha = np.where(raster.mask, 255, 0).astype(np.uint8)
     for example in examples.examples:
         points = np.concatenate([example.points, layout.frame(example.points)])
-        yield np.dstack([warped(example.photo, points, layout.triangles, raster), alpha])
+        yield np.dstack([warp_to_raster(example.photo, points, layout.triangles, raster), alpha])
 
 
-def warped(
+def warp_to_raster(
     photo: UInt8[Array, "h w 3"],
     points: Float[Array, "n 2"],
     triangles: Int[Array, "t 3"],

@@ -12,7 +12,7 @@ from mien.arrays import Array, Float, UInt8, check_array, check_image, frozen
 from mien.assets.feature_points import FeatureLayout
 from mien.assets.subregions import Subregions
 from mien.errors import InputError
-from mien.synthesis.examples.head_alignment import compensated
+from mien.synthesis.examples.head_alignment import align_to_neutral
 
 __all__ = ["Example", "ExampleSet"]
 
@@ -135,5 +135,5 @@ class ExampleSet:
         Source:
             [Zhang 2006] section 12, eq. (8), (9).
         """
-        geometries, _ = compensated(points, self.neutral.points)
+        geometries, _ = align_to_neutral(points, self.neutral.points)
         return geometries

@@ -10,10 +10,10 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import FeatureLayout
 from mien.numeric.raster.rasterizer import rasterize
-from mien.synthesis.composition.example_warping import warped
+from mien.synthesis.composition.example_warping import warp_to_raster
 from mien.synthesis.examples.example_set import Example
 
-__all__ = ["NOISE", "brightened", "evened", "exposure_gains"]
+__all__ = ["NOISE", "apply_gain", "equalize_exposure", "exposure_gains"]
 
 NOISE = 0.04
 """What gains differ by for other reasons. In three clips that are exposed alike they are within
@@ -25,11 +25,11 @@ _SIDE = 160
 _DARKEST, _BRIGHTEST = 12, 247
 
 
-def evened(layout: FeatureLayout, examples: Sequence[Example]) -> tuple[Example, ...]:
+def equalize_exposure(layout: FeatureLayout, examples: Sequence[Example]) -> tuple[Example, ...]:
     """The examples, those that are exposed unlike the first one brought to its exposure."""
     gains = exposure_gains(layout, examples)
     return tuple(
-        replace(example, photo=brightened(example.photo, gain))
+        replace(example, photo=apply_gain(example.photo, gain))
         if np.abs(gain - 1).max() > NOISE
         else example
         for example, gain in zip(examples, gains, strict=True)
@@ -52,13 +52,13 @@ def exposure_gains(layout: FeatureLayout, examples: Sequence[Example]) -> Float[
     width, height = np.ceil(places.max(axis=0)).astype(int)
     raster = rasterize(places, np.ones(len(places)), triangles, int(width), int(height))
     faces = [
-        warped(example.photo, example.points, triangles, raster)[raster.mask]
+        warp_to_raster(example.photo, example.points, triangles, raster)[raster.mask]
         for example in examples
     ]
     return np.array([_gain(face, faces[0]) for face in faces])
 
 
-def brightened(photo: UInt8[Array, "h w 3"], gain: Float[Array, " 3"]) -> UInt8[Array, "h w 3"]:
+def apply_gain(photo: UInt8[Array, "h w 3"], gain: Float[Array, " 3"]) -> UInt8[Array, "h w 3"]:
     """The photo with each channel multiplied, cut at white."""
     table = np.arange(256)[:, None] * gain
     values = np.rint(table).clip(0, 255).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""Head motion in the image plane, undone."""
+"""Compensation of head motion in the image plane."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import numpy as np
 from mien.arrays import Array, Float, Int, check_array
 from mien.numeric.planar_similarity import PlanarMotion, estimate_planar_motion
 
-__all__ = ["compensated"]
+__all__ = ["align_to_neutral"]
 
 
-def compensated(
+def align_to_neutral(
     points: Float[Array, "*batch n 2"],
     neutral: Float[Array, "n 2"],
     *,
-    by: Int[Array, " k"] | None = None,
+    subset: Int[Array, " k"] | None = None,
 ) -> tuple[Float[Array, "*batch n 2"], PlanarMotion]:
     """Geometries: the points with the head's motion since the neutral face undone.
 
     Args:
         points: (..., N, 2) px, of faces with expressions.
         neutral: (N, 2) px, the same points of the neutral face; N >= 2.
-        by: indices of the points that tell the motion; all unless given. Displacements learned from
-            and those of a few points to be completed must be told by the same.
+        subset: indices of the points that the motion is estimated from; all unless given. The
+            statistics and the points to be completed from them must be aligned by the same subset.
 
     Returns:
         (..., N, 2) px of the neutral face's image; the motion from there to the points.
@@ -37,6 +37,6 @@ def compensated(
     """
     neutral = check_array("neutral", neutral, (None, 2))
     points = check_array("points", points, (*np.shape(points)[:-2], *neutral.shape))
-    told = slice(None) if by is None else by
-    motion = estimate_planar_motion(neutral[told], points[..., told, :])
+    used = slice(None) if subset is None else subset
+    motion = estimate_planar_motion(neutral[used], points[..., used, :])
     return motion.undo(points), motion

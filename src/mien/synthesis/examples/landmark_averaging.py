@@ -9,11 +9,11 @@ from mien.assets.feature_points import FeatureLayout
 from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.images.photos import shrunk
 from mien.errors import InputError
-from mien.synthesis.examples.brows import on_brows
+from mien.synthesis.examples.brow_correction import correct_brows
 
-__all__ = ["TURNS", "steady_points"]
+__all__ = ["ROTATIONS_DEG", "averaged_points"]
 
-TURNS = (0.0, 6.0, -6.0)
+ROTATIONS_DEG = (0.0, 6.0, -6.0)
 """Degrees by which the face is turned in its plane, each as it is and mirrored."""
 
 _SIDE, _WIDTHS = 512, 3.0
@@ -22,13 +22,13 @@ _FAR = 0.05
 """Points that are off by more than this share of the face's width, in the mean, are another's."""
 
 
-def steady_points(
+def averaged_points(
     layout: FeatureLayout,
     detector: LandmarkDetector,
     pixels: UInt8[Array, "h w 3"],
     landmarks: Float[Array, "478 2"],
     *,
-    turns: tuple[float, ...] = TURNS,
+    turns: tuple[float, ...] = ROTATIONS_DEG,
 ) -> Float[Array, "n 2"]:
     """The mean of what the detector sees in a picture, turned and mirrored, brows where they are.
 
@@ -64,7 +64,7 @@ def steady_points(
     ]
     # Another face may be larger in a cut-out than the one that is meant.
     near = [p for p in found if np.linalg.norm(p - once, axis=1).mean() < _FAR * width]
-    return on_brows(layout, pixels, np.mean(near, axis=0) if near else once)
+    return correct_brows(layout, pixels, np.mean(near, axis=0) if near else once)
 
 
 def _seen(

@@ -8,11 +8,11 @@ from mien.arrays import Array, Bool, Float, UInt8
 from mien.assets.feature_points import FeatureLayout
 from mien.capture.images.photos import shrunk
 from mien.numeric.raster.rasterizer import rasterize
-from mien.synthesis.composition.example_warping import warped
+from mien.synthesis.composition.example_warping import warp_to_raster
 
-__all__ = ["LipColours"]
+__all__ = ["LipContrast"]
 
-LEAST_CONTRAST = 0.1
+MIN_CONTRAST = 0.1
 """What must be left of how the lips usually differ from the skin. On seven clips without hands
 (3958 frames) no quarter of the lips ever keeps less than 0.13 of it; of 176 frames in which a hand
 is before the mouth, 114 fall below, and all but a few of the others are near these in time."""
@@ -23,7 +23,7 @@ AROUND_SECONDS = 0.5
 GAP_SECONDS = 2.0
 """A hand that is there before and after so short a time was there all the while."""
 
-FEWEST = 12
+MIN_PICTURES = 12
 """What is usual cannot be told from fewer pictures."""
 
 _WIDTH = 72
@@ -31,7 +31,7 @@ _DARK = 8.0
 """Added to colours before their logarithm is taken, so that noise in the dark counts little."""
 
 
-class LipColours:
+class LipContrast:
     """How the lips differ in colour from the skin, in four quarters, picture after picture.
 
     A covered mouth shows skin, or nothing like lips, where the detector still puts the lips. Brows
@@ -65,7 +65,9 @@ class LipColours:
             return
         small = shrunk(crop, 2 * _WIDTH)
         scale = np.array(small.shape[1::-1]) / crop.shape[1::-1]
-        face = warped(small, (points - low) * scale, self._layout.face_triangles, self._raster)
+        face = warp_to_raster(
+            small, (points - low) * scale, self._layout.face_triangles, self._raster
+        )
         logs = np.log(face.astype(np.float32) + _DARK)
         skin = np.median(logs[self._raster.mask], axis=0)
         contrasts = [logs[quarter].mean(axis=0) - skin for quarter in self._quarters]
@@ -78,11 +80,11 @@ class LipColours:
             seconds: when each was taken, of a video.
         """
         seen = np.array(self._seen)
-        if len(seen) < FEWEST or not seen.size:
+        if len(seen) < MIN_PICTURES or not seen.size:
             return np.zeros(len(seen), bool)
         usual = np.nanmedian(seen, axis=0)
         kept = (seen * usual).sum(axis=2) / np.maximum((usual**2).sum(axis=1), 1e-9)
-        bare: Array = (kept < LEAST_CONTRAST).any(axis=1)
+        bare: Array = (kept < MIN_CONTRAST).any(axis=1)
         if seconds is None or not bare.any():
             return bare
         return _near(seconds, np.sort(seconds[bare]))

@@ -7,16 +7,16 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, Int
 from mien.capture.faces.landmarks import is_cut
 
-__all__ = ["COVERED", "CUT", "unfit_reasons"]
+__all__ = ["CUT", "OCCLUDED", "rejection_reasons"]
 
-CUT, COVERED = "cut by the edge of the picture", "something is before the mouth"
+CUT, OCCLUDED = "cut by the edge of the picture", "something is before the mouth"
 SMALL = "small"
 
 _LEAST_WIDTH = 0.8
 """Of the usual width of the face: smaller ones have less to show."""
 
 
-def unfit_reasons(
+def rejection_reasons(
     points: Float[Array, "N n 2"], sizes: Int[Array, "N 2"], covered: Bool[Array, " N"]
 ) -> tuple[str, ...]:
     """For each picture the reason, or "".
@@ -32,7 +32,7 @@ def unfit_reasons(
     widths = np.ptp(points[..., 0], axis=1)
     cut = np.array([is_cut(own, size) for own, size in zip(points, sizes, strict=True)], bool)
     share = widths / np.median(widths)
-    faults: dict[str, Array] = {CUT: cut, COVERED: covered, SMALL: share < _LEAST_WIDTH}
+    faults: dict[str, Array] = {CUT: cut, OCCLUDED: covered, SMALL: share < _LEAST_WIDTH}
     reasons = [""] * len(points)
     for reason, found in faults.items():
         if found.mean() > 0.5:

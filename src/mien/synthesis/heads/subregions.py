@@ -12,8 +12,8 @@ from mien.assets.feature_points import load_feature_layout
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.assets.subregions import default_subregions
 from mien.rig.followers import part_vertices
-from mien.synthesis.heads.points import feature_points_on
-from mien.synthesis.heads.skin import inside_of_face, spread_over_skin
+from mien.synthesis.heads.feature_points import feature_points_on
+from mien.synthesis.heads.skin_interpolation import behind_lips_and_lids, harmonic_extension
 
 __all__ = ["HeadSubregions", "head_subregions"]
 
@@ -70,7 +70,7 @@ def head_subregions() -> HeadSubregions:
     fades[:, own] = 0
     total = fades.sum(axis=1, keepdims=True)
     drawn_on = _drawn_on(generic) & (total[:, 0] > _OUTLINE)
-    fades = spread_over_skin(fades / np.maximum(total, _OUTLINE), drawn_on)
+    fades = harmonic_extension(fades / np.maximum(total, _OUTLINE), drawn_on)
     for part, name in _PARTS.items():
         fades[part_vertices(generic, part)] = np.array(drawn.names) == name
     swapped = [drawn.names.index(_other_side(name)) for name in drawn.names]
@@ -90,7 +90,7 @@ def _sampled(fades: Float[Array, "h w r"], places: Float[Array, "v 2"]) -> Float
 
 def _drawn_on(generic: GenericHead) -> Bool[Array, " v"]:
     """Skin that faces the front and lies behind nothing."""
-    facing: Array = (generic.mesh.vertex_normals()[:, 2] > _FACING) & ~inside_of_face()
+    facing: Array = (generic.mesh.vertex_normals()[:, 2] > _FACING) & ~behind_lips_and_lids()
     skin = np.zeros(len(facing), bool)
     skin[part_vertices(generic, "skin")] = True
     return facing & skin

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from mien.arrays import Array, Float, Int, check_array, frozen
+from mien.arrays import Array, Float, check_array, frozen
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.generic import load_generic_head
 from mien.head import Head
@@ -15,23 +16,28 @@ from mien.rig.followers import part_vertices
 from mien.rig.gaze import SIDES
 from mien.rig.rig import Rig
 from mien.rig.state import PosedFace
-from mien.synthesis.heads.points import feature_points_on, skin_with_points
+from mien.synthesis.heads.feature_points import feature_points_on, thin_plate_weights
 from mien.synthesis.heads.subregions import head_subregions
-from mien.synthesis.inference.coefficients import coefficients_of, distances_of
-from mien.synthesis.inference.conditional import ConditionalMotion
-from mien.synthesis.inference.inferred import Inference, check_known
-from mien.synthesis.inference.propagation import Propagation
+from mien.synthesis.inference.coefficients import coefficients_from_offsets, mixture_distances
+from mien.synthesis.inference.conditional import ConditionalGaussian
+from mien.synthesis.inference.displacement_model import (
+    DisplacementModel,
+    KnownPoints,
+    check_known,
+    point_indices,
+)
+from mien.synthesis.inference.propagation import MotionPropagation
 from mien.synthesis.synthesizer import SynthesisOptions
 
 __all__ = ["HeadSynthesis", "HeadSynthesizer"]
 
-LEAST_SHARE = 1e-3
-"""Smaller shares of an example are none: they change no colour by a quarter of its step."""
+MIN_COEFFICIENT = 1e-3
+"""Smaller coefficients are set to 0: they change no colour by a quarter of its step."""
 _NEAR_MM = 1e-6
-_EXPRESSION, _UNIT = 0.5, 0.2
-"""How far an expression and a unit are usually made, of the whole of it."""
-_SURE_MM = 0.3
-"""How well a point that is given is known: with more trust few points tell too much."""
+_EXPRESSION_DEVIATION, _UNIT_DEVIATION = 0.5, 0.2
+"""Standard deviations of the weights of a photographed expression and of a face unit."""
+_POINT_NOISE_MM = 0.3
+"""Standard deviation of the given points; with less, few points move the others too far."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +45,11 @@ class HeadSynthesis:
     """An expression of a head, and what it was made from.
 
     Attributes:
-        face: shape, and whose texture shows how much where.
+        face: shape, and the weights of the expressions' textures at each vertex.
         points: (n, 3) mm, head space, as they were asked for.
-        coefficients: (R, K) share of each photographed expression in each subregion.
+        coefficients: (R, K) of the photographed expressions in each subregion; rows sum to 1.
         hull_mm: (R,) root of the mean squared distance of each subregion's points from those of the
-            mix that it was made from.
+            mixture that it was made from.
     """
 
     face: PosedFace
@@ -56,18 +62,19 @@ class HeadSynthesizer:
     """Makes the expressions of a head from feature points; made once, used for many.
 
     The photographed expressions are the examples: their shapes give the feature points, their
-    shapes and textures are mixed. They lie in the head's own space, so no motion has to be undone.
+    shapes and textures are mixed. They lie in head space, so no head motion is compensated.
 
     Attributes:
         rig: poses and draws the head; its `names` are the examples'.
-        layout: what points there are. subregions: on the mesh.
+        layout: of the points.
+        subregions: on the mesh.
         examples: (K, n, 3) mm, head space, the points of each expression; neutral first.
 
     Args:
         head: with the generic head's mesh.
-        options: beyond the paper or not.
-        reach: whether skin and eyes are moved on to where the points were asked for, as pictures
-            are warped; the paper leaves them where the mix of examples has them.
+        options: additions to the paper; all that were measured better unless given.
+        warp: whether skin and eyes of the mixture are then warped so that they reach the target
+            points, as pictures are; the paper leaves them where the mixture has them.
         rig: of the head, if there is one already.
 
     Raises:
@@ -82,27 +89,28 @@ class HeadSynthesizer:
         head: Head,
         options: SynthesisOptions | None = None,
         *,
-        reach: bool = True,
+        warp: bool = True,
         rig: Rig | None = None,
     ) -> None:
         self.rig = Rig(head) if rig is None else rig
         self.layout, self.subregions = load_feature_layout(), head_subregions()
-        self._options, self._reach = options or SynthesisOptions(), reach
+        self._options, self._warp = options or SynthesisOptions(), warp
         shapes = np.stack([head.expressions[name].vertices for name in self.rig.names])
         self.examples = frozen(feature_points_on(shapes))
         self._units = feature_points_on(head.units)
-        self._inference: Inference | None = None
+        self._model: DisplacementModel | None = None
 
     def complete(
-        self, known: Int[Array, " k"], positions: Float[Array, "k 3"]
+        self, known: KnownPoints, positions: ArrayLike | None = None
     ) -> Float[Array, "n 3"]:
         """Where all points are, given where some are.
 
-        What is usual for them comes from the photographed expressions and the head's face units:
-        each of them made to any degree, independently of the others.
+        Their statistics come from the photographed expressions and the head's face units, each
+        taken to any degree, independently of the others.
 
         Args:
-            known: indices of points, none twice.
+            known: positions by the points' names, mm, head space; or (k,) names or indices of
+                points, none twice, with `positions` beside.
             positions: (k, 3) mm, head space.
 
         Returns:
@@ -115,16 +123,17 @@ class HeadSynthesizer:
             [Zhang 2006] section 10.
         """
         neutral = self.examples[0]
-        known, positions = check_known(known, positions, *neutral.shape)
-        if self._inference is None:
-            self._inference = self._learned()
-        inferred = self._inference.infer(known, positions - neutral[known])
+        indices, places = point_indices(self.layout, known, positions)
+        subset, given = check_known(indices, places, *neutral.shape)
+        if self._model is None:
+            self._model = self._fitted_model()
+        inferred = self._model.infer(subset, given - neutral[subset])
         completed: Array = neutral + inferred.displacements
-        completed[known] = positions
+        completed[subset] = given
         return completed
 
     def synthesize(self, points: Float[Array, "n 3"]) -> HeadSynthesis:
-        """The expression whose points these are, as near as the head's own come to it.
+        """The expression with these points, as near as the head's own expressions come to it.
 
         Args:
             points: (n, 3) mm, head space, all that the layout has.
@@ -136,63 +145,63 @@ class HeadSynthesizer:
             [Zhang 2006] sections 6, 7, 9: vertices and colours are mixed alike.
         """
         points = check_array("points", points, (len(self.layout.names), 3))
-        apart, options = self.examples - points, self._options
-        shares = coefficients_of(
-            apart,
+        offsets, options = self.examples - points, self._options
+        coefficients = coefficients_from_offsets(
+            offsets,
             self.subregions,
             distance_penalty=options.distance_penalty,
             slack=options.slack,
-            together=options.together or (),
+            tied=options.tied or (),
         )
-        shares = _without_small(shares)
-        # In this order, subregions that agree leave no trace of their borders.
-        weights = shares[0] + self.subregions.fades @ (shares - shares[0])
-        missed = distances_of(apart, shares, self.subregions)
+        coefficients = _without_small(coefficients)
+        # In this order, equal rows give exactly equal weights also where subregions blend.
+        weights = coefficients[0] + self.subregions.fades @ (coefficients - coefficients[0])
+        hull_mm = mixture_distances(offsets, coefficients, self.subregions)
         face = self._mixed(weights, points)
-        return HeadSynthesis(face, frozen(points), frozen(shares), frozen(missed))
+        return HeadSynthesis(face, frozen(points), frozen(coefficients), frozen(hull_mm))
 
     def _mixed(self, weights: Float[Array, "v k"], points: Float[Array, "n 3"]) -> PosedFace:
-        if not self._reach:
+        if not self._warp:
             return self.rig.mixed(weights)
         mixed = self.rig.mixed(weights, contacts=False)
-        missing = points - feature_points_on(mixed.vertices)
-        if np.abs(missing).max() < _NEAR_MM:
+        residual = points - feature_points_on(mixed.vertices)
+        if np.abs(residual).max() < _NEAR_MM:
             return self.rig.mixed(weights)
-        turn = self._turn(mixed.vertices, points)
-        return self.rig.mixed(weights, skin_with_points() @ missing, turn=turn)
+        turn = self._eye_rotation(mixed.vertices, points)
+        return self.rig.mixed(weights, thin_plate_weights() @ residual, turn=turn)
 
-    def _turn(
+    def _eye_rotation(
         self, vertices: Float[Array, "v 3"], points: Float[Array, "n 3"]
     ) -> Float[Array, "2 2"]:
-        """(2, 2) rad, how the eyes of a face turn on until the pupils are where points say."""
+        """(2, 2) rad, yaw and pitch by which each eye rotates to bring its pupil to its point."""
         balls = [part_vertices(load_generic_head(), f"{side}_eyeball") for side in SIDES]
         centres = np.array([vertices[ball].mean(axis=0) for ball in balls])
         pupils = [self.layout.index(f"{side}_pupil") for side in SIDES]
-        towards = np.stack([points[pupils], feature_points_on(vertices)[pupils]]) - centres
-        towards /= np.linalg.norm(towards, axis=2, keepdims=True)
-        wanted, found = map(yaw_pitch_of, towards)
-        return np.clip(wanted - found, -MOST_RAD, MOST_RAD)
+        directions = np.stack([points[pupils], feature_points_on(vertices)[pupils]]) - centres
+        directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+        target, current = map(yaw_pitch_of, directions)
+        return np.clip(target - current, -MOST_RAD, MOST_RAD)
 
-    def _learned(self) -> Inference:
+    def _fitted_model(self) -> DisplacementModel:
         expressions = self.examples[1:] - self.examples[0]
-        moves = np.concatenate([_EXPRESSION * expressions, _UNIT * self._units])
-        # As many rows as ways to move, and as many again the other way: each spreads as it usually
-        # does, independently of the others.
-        moves *= np.sqrt(len(moves))
-        statistics = np.concatenate([moves, -moves])
+        rows = np.concatenate([_EXPRESSION_DEVIATION * expressions, _UNIT_DEVIATION * self._units])
+        # Rows and their negatives, scaled so that the covariance is the sum of the rows' products:
+        # each weight varies by its standard deviation, independently of the others.
+        rows *= np.sqrt(len(rows))
+        statistics = np.concatenate([rows, -rows])
         if self._options.propagation == "printed":
-            return Propagation(self.layout, statistics)
-        return ConditionalMotion(
+            return MotionPropagation(self.layout, statistics)
+        return ConditionalGaussian(
             statistics,
-            components=len(moves),
-            least_noise=_SURE_MM,
-            places=self.layout.template,
+            components=len(rows),
+            min_noise=_POINT_NOISE_MM,
+            template=self.layout.template,
         )
 
 
-def _without_small(shares: Float[Array, "r k"]) -> Float[Array, "r k"]:
-    """Shares that still sum to 1; what the small ones had goes to the largest."""
-    kept = np.where(np.abs(shares) < LEAST_SHARE, 0.0, shares)
+def _without_small(coefficients: Float[Array, "r k"]) -> Float[Array, "r k"]:
+    """Coefficients that still sum to 1; what the small ones had goes to the largest."""
+    kept = np.where(np.abs(coefficients) < MIN_COEFFICIENT, 0.0, coefficients)
     largest = kept.argmax(axis=1)[:, None]
     others = kept.copy()
     np.put_along_axis(others, largest, 0.0, axis=1)

@@ -1,4 +1,4 @@
-"""Which examples make each subregion of an expression, and in which share."""
+"""Which examples make each subregion of an expression, and with which coefficients."""
 
 from __future__ import annotations
 
@@ -16,18 +16,17 @@ __all__ = [
     "BROWS",
     "DISTANCE_PENALTY",
     "UPPER_FACE",
-    "apart_from",
     "coefficients",
-    "coefficients_of",
-    "distances_of",
-    "hull_distances",
+    "coefficients_from_offsets",
+    "example_offsets",
+    "mixture_distances",
 ]
 
 DISTANCE_PENALTY = 0.05
 """On both halves of two clips as near as 0.02 (-0.03 to 0.08 dB), and sharper."""
 
 BROWS = ("forehead", "right_brow", "left_brow")
-"""Frowns move them as one: on six halves of four clips together 0.01 to 0.1 dB, never a loss."""
+"""Frowns move them as one: on six halves of four clips tied 0.01 to 0.1 dB, never a loss."""
 
 UPPER_FACE = (
     "forehead",
@@ -42,13 +41,17 @@ UPPER_FACE = (
 
 
 class HasMembers(Protocol):
-    """Subregions of a picture or of a mesh: all that is asked of them here."""
+    """Subregions of a picture or of a mesh: their names and feature points."""
 
     @property
-    def names(self) -> Sequence[str]: ...
+    def names(self) -> Sequence[str]:
+        """R of them."""
+        ...
 
     @property
-    def members(self) -> Sequence[Int[Array, " k"]]: ...
+    def members(self) -> Sequence[Int[Array, " k"]]:
+        """Of each, the indices of its feature points."""
+        ...
 
 
 def coefficients(
@@ -57,62 +60,67 @@ def coefficients(
     *,
     distance_penalty: float = DISTANCE_PENALTY,
     slack: float = 0.0,
-    together: Sequence[Collection[str]] | None = None,
+    tied: Sequence[Collection[str]] | None = None,
 ) -> Float[Array, "R m"]:
-    """Each subregion's geometry as a mix of the examples' geometries.
+    """Each subregion's geometry as a mixture of the examples' geometries.
 
     Args:
+        example_set: of the person.
         points: (n, 2) px of any photo, all that the layout has.
         distance_penalty: the paper has 0. Beyond it, what an example costs by its squared distance
-            from the geometry asked for, those being 1 in the mean: of two mixes that fit alike, the
+            from the target geometry, those being 1 in the mean: of two mixtures that fit alike, the
             one of near examples wins: 0.0 to 0.3 dB by the mean of the frames on six halves of four
             clips. 0.2 takes up to 0.3 dB again and leaves more detail.
-        together: groups of subregions, by name, that get the same shares, from all their points;
-            the paper has none: (). Unless given, `BROWS` where there are such subregions.
-        slack: how far below 0 shares may fall; the paper has 0. More leaves the convex hull. With
-            40 examples 0.01 gives 0.1 dB on one clip and takes 1 on two; 0.05 takes 2 to 4 on all.
+        slack: how far below 0 coefficients may fall; the paper has 0. More leaves the convex hull.
+            With 40 examples 0.01 gives 0.1 dB on one clip and takes 1 on two; 0.05 takes 2 to 4 on
+            all.
+        tied: groups of subregions, by name, that share one row of coefficients, fitted to all their
+            points; the paper has none: (). Unless given, `BROWS` where there are such subregions.
 
     Returns:
-        (R, m) shares; each row sums to 1.
+        (R, m) coefficients; each row sums to 1.
 
     Raises:
-        InputError: shape, NaN, a negative penalty, a group that names no subregion or shares one
-            with another.
+        InputError: shape, NaN, a negative penalty, a group that names no subregion or one of
+            another group.
         EstimationError: all points in one place.
 
     Source:
         [Zhang 2006] section 6, eq. (2) to (5).
     """
-    return coefficients_of(
-        apart_from(example_set, points),
+    return coefficients_from_offsets(
+        example_offsets(example_set, points),
         example_set.subregions,
         distance_penalty=distance_penalty,
         slack=slack,
-        together=together,
+        tied=tied,
         only=example_set.only,
     )
 
 
-def coefficients_of(
-    apart: Float[Array, "m n d"],
+def coefficients_from_offsets(
+    offsets: Float[Array, "m n d"],
     subregions: HasMembers,
     *,
     distance_penalty: float = DISTANCE_PENALTY,
     slack: float = 0.0,
-    together: Sequence[Collection[str]] | None = None,
+    tied: Sequence[Collection[str]] | None = None,
     only: Mapping[str, Sequence[int]] | None = None,
 ) -> Float[Array, "R m"]:
     """The same of any geometries, in the plane or in space.
 
     Args:
-        apart: (m, n, d) the examples' geometries relative to the one asked for.
+        offsets: (m, n, d) the examples' geometries less the target geometry.
         subregions: whose members are some of the n points.
         distance_penalty: as for `coefficients`.
         slack: as for `coefficients`.
-        together: as for `coefficients`.
-        only: the examples that a subregion is made from where they are near: teeth from those that
-            show teeth, unless the mouth is shut. In between it is made from both, so that a mouth
-            that opens does so without a jump. Not of those together with others.
+        tied: as for `coefficients`.
+        only: by subregion, the examples that it is made from where they are near: teeth from those
+            that show teeth, unless the mouth is shut. In between it is made from these and from
+            all, so that a mouth that opens does so without a jump. Tied subregions ignore it.
+
+    Returns:
+        (R, m) coefficients; each row sums to 1.
 
     Raises:
         InputError: as `coefficients`.
@@ -124,100 +132,84 @@ def coefficients_of(
         raise InputError("distance_penalty", "a number of at least 0", distance_penalty)
     if not 0 <= slack < np.inf:
         raise InputError("slack", "a number of at least 0", slack)
-    shares = np.zeros((len(subregions.names), len(apart)))
-    for rows in _groups(subregions.names, together):
-        # Most groups are one subregion, and looking for what is double takes time.
+    result = np.zeros((len(subregions.names), len(offsets)))
+    for rows in _groups(subregions.names, tied):
+        # Most groups are one subregion, and removing duplicates takes time.
         members = subregions.members[rows[0]]
         if len(rows) > 1:
             members = np.unique(np.concatenate([subregions.members[row] for row in rows]))
-        offsets = apart[:, members].reshape(len(apart), -1)
-        products = offsets @ offsets.T
-        used = (only or {}).get(subregions.names[rows[0]], ()) if len(rows) == 1 else ()
-        part = _share_of(products.diagonal(), used)
-        if part > 0:
-            few = _mixture(products[np.ix_(used, used)], distance_penalty, slack)
-            shares[rows[0], used] = part * few
-        if part < 1:
-            shares[rows] += (1 - part) * _mixture(products, distance_penalty, slack)
-    return shares
+        flat = offsets[:, members].reshape(len(offsets), -1)
+        gram = flat @ flat.T
+        subset = (only or {}).get(subregions.names[rows[0]], ()) if len(rows) == 1 else ()
+        weight = _subset_weight(gram.diagonal(), subset)
+        if weight > 0:
+            few = _mixture(gram[np.ix_(subset, subset)], distance_penalty, slack)
+            result[rows[0], subset] = weight * few
+        if weight < 1:
+            result[rows] += (1 - weight) * _mixture(gram, distance_penalty, slack)
+    return result
 
 
-def _share_of(squares: Float[Array, " m"], used: Sequence[int]) -> float:
-    """How much of a subregion some examples make alone, by the squared distance of the nearest.
+def _subset_weight(squares: Float[Array, " m"], subset: Sequence[int]) -> float:
+    """How much of a subregion a subset of the examples makes alone, by the nearest's distance.
 
-    All where that of the others is three times theirs, half where both are as near, and nothing
-    where it is a third.
+    1 where the squared distance of the others is three times theirs, 0.5 where both are as near,
+    and 0 where it is a third.
     """
-    if not used:
+    if not subset:
         return 0.0
-    others = np.delete(squares, used)
+    others = np.delete(squares, subset)
     if not others.size:
         return 1.0
-    near, far = squares[list(used)].min(), others.min()
+    near, far = squares[list(subset)].min(), others.min()
     return float(np.clip(0.5 + (far - near) / max(far + near, 1e-300), 0, 1))
 
 
-def _mixture(products: Float[Array, "m m"], distance_penalty: float, slack: float) -> Array:
-    """Shares of the examples whose offsets have these products."""
-    penalty = distance_penalty * products.diagonal()
-    return nearest_mixture(products, slack=slack, penalty=penalty)
+def _mixture(gram: Float[Array, "m m"], distance_penalty: float, slack: float) -> Array:
+    """Coefficients of the examples whose offsets have these inner products."""
+    return nearest_mixture(gram, slack=slack, penalty=distance_penalty * gram.diagonal())
 
 
-def distances_of(
-    apart: Float[Array, "m n d"], shares: Float[Array, "R m"], subregions: HasMembers
+def mixture_distances(
+    offsets: Float[Array, "m n d"], coefficients: Float[Array, "R m"], subregions: HasMembers
 ) -> Float[Array, " R"]:
-    """How far the mixes of examples are from the geometry asked for.
+    """How far the mixtures of examples are from the target geometry.
 
     Args:
-        apart: as for `coefficients_of`.
-        shares: of the examples in each subregion.
+        offsets: as for `coefficients_from_offsets`.
+        coefficients: of the examples in each subregion.
+        subregions: as for `coefficients_from_offsets`.
 
     Returns:
         (R,) root of the mean squared distance of each subregion's points.
     """
-    missed = np.tensordot(shares, apart, axes=1)
-    squares = (missed**2).sum(axis=2)
-    parts = zip(squares, subregions.members, strict=True)
-    return np.sqrt([row[members].mean() for row, members in parts])
+    residuals = np.tensordot(coefficients, offsets, axes=1)
+    squares = (residuals**2).sum(axis=2)
+    pairs = zip(squares, subregions.members, strict=True)
+    return np.sqrt([row[members].mean() for row, members in pairs])
 
 
-def _groups(names: Sequence[str], together: Sequence[Collection[str]] | None) -> list[list[int]]:
-    """Rows of subregions that get the same shares; every subregion in one group."""
-    if together is None:
-        together = [BROWS] if set(BROWS) <= set(names) else []
-    grouped = [name for group in together for name in group]
+def _groups(names: Sequence[str], tied: Sequence[Collection[str]] | None) -> list[list[int]]:
+    """Rows of subregions that share coefficients; every subregion in one group."""
+    if tied is None:
+        tied = [BROWS] if set(BROWS) <= set(names) else []
+    grouped = [name for group in tied for name in group]
     unknown = sorted(set(grouped) - set(names))
     if unknown:
-        raise InputError("together", f"subregions of {', '.join(names)}", unknown[0])
+        raise InputError("tied", f"subregions of {', '.join(names)}", unknown[0])
     if len(set(grouped)) < len(grouped):
         twice = next(name for name in grouped if grouped.count(name) > 1)
-        raise InputError("together", "each subregion in one group", f"{twice} twice")
-    groups = [[names.index(name) for name in group] for group in together if group]
+        raise InputError("tied", "each subregion in one group", f"{twice} twice")
+    groups = [[names.index(name) for name in group] for group in tied if group]
     return groups + [[row] for row, name in enumerate(names) if name not in grouped]
 
 
-def hull_distances(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Float[Array, " R"]:
-    """How far each subregion's geometry is from any mix of examples: from 2 px on it shows.
+def example_offsets(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Float[Array, "m n 2"]:
+    """The examples' geometries less the target geometry, px of the neutral photo.
 
     Args:
-        points: (n, 2) px of any photo.
-
-    Returns:
-        (R,) root of the mean squared distance of the subregion's points, px of the neutral photo.
-
-    Raises:
-        as `coefficients`.
-    """
-    apart = apart_from(example_set, points)
-    shares = coefficients_of(apart, example_set.subregions, distance_penalty=0.0, together=())
-    return distances_of(apart, shares, example_set.subregions)
-
-
-def apart_from(example_set: ExampleSet, points: Float[Array, "n 2"]) -> Float[Array, "m n 2"]:
-    """The examples' geometries relative to the one asked for, px of the neutral photo.
-
-    Args:
-        points: (n, 2) px of any photo.
+        example_set: of the person.
+        points: (n, 2) px of any photo, those of the target.
 
     Raises:
         InputError: shape, NaN.

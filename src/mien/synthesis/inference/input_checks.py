@@ -1,4 +1,4 @@
-"""What given points tell: that they are mirrored, another person's, or a moved head's."""
+"""Whether given points are mirrored, those of another person, or of a head that has moved."""
 
 from __future__ import annotations
 
@@ -9,34 +9,45 @@ from mien.assets.feature_points import FeatureLayout
 from mien.errors import InputError
 from mien.numeric.planar_similarity import estimate_planar_motion
 from mien.synthesis.examples.example_set import ExampleSet
-from mien.synthesis.examples.head_alignment import compensated
-from mien.synthesis.inference.inferred import check_known
+from mien.synthesis.examples.head_alignment import align_to_neutral
+from mien.synthesis.inference.displacement_model import check_known
 
-__all__ = ["ENOUGH_STATISTICS", "STRANGER", "face_width", "head_moved", "look_mirrored", "oddness"]
+__all__ = [
+    "MIN_STATISTICS",
+    "OUTLIER_RMS",
+    "face_width",
+    "head_moved",
+    "look_mirrored",
+    "mahalanobis_rms",
+]
 
-STRANGER = 0.8
-"""The oddness from which points are likelier another person's, or of a head that is turned far.
+OUTLIER_RMS = 0.8
+"""The Mahalanobis RMS from which a face is rather another person's, or is turned far.
 
 Learned from every other stretch of seven clips: 4 in 100 of the other frames reach it, those of
 another clip of the same person among them, and 2 or 3 in 100 pictures of fourteen others do
 not.
 """
 
-ENOUGH_STATISTICS = 20
-"""From fewer expressions one cannot tell what is usual for a person."""
+MIN_STATISTICS = 20
+"""Expressions; from fewer the covariance of a person's points cannot be estimated."""
 
-_LEAST_SPREAD = 0.005
-"""Face widths by which a point may lie elsewhere in any expression that was seen."""
+_DEVIATION_FLOOR = 0.005
+"""Face widths, of a point in any expression that was seen."""
 
-_BEYOND = 2.0
-"""So much larger than those seen expressions may be, and the head still have stayed."""
+_STILL_SCALE = 2.0
+"""Expressions of a still head may be so many times as large as those of the statistics."""
 
-_TURN, _SHIFT = 0.1, 0.3
-"""Where the head may have gone: radians, or parts of its size; face widths."""
+_ROTATION_DEVIATION, _SHIFT_DEVIATION = 0.1, 0.3
+"""Of a head's motion: radians, and likewise parts of its size; face widths."""
 
 
 def face_width(layout: FeatureLayout, points: Float[Array, "n 2"]) -> float:
-    """Of a face whose points these are, px, told by those that no expression moves.
+    """Width of a face, px, from those of its points that no expression moves.
+
+    Args:
+        layout: of the points.
+        points: (n, 2) px.
 
     Raises:
         InputError: shape, NaN.
@@ -55,12 +66,13 @@ def look_mirrored(
 ) -> bool:
     """Whether the points fit a face better when right and left are exchanged.
 
-    Right and left are the subject's; a picture that was flipped, or points named as the viewer
-    sees them, look alike. Points of the midline alone never look mirrored. Of faces of nine
-    people, with all points or some, none was taken for mirrored, and 99 in 100 of those that were
-    mirrored were found; but for few points nearly on a line.
+    Right and left are the subject's. A picture that was flipped and points that are named as the
+    viewer sees them have the same effect. Points of the midline alone never look mirrored. Of
+    faces of nine people, with all points or some, none was taken for mirrored, and 99 in 100 of
+    those that were mirrored were found, except for few points nearly on a line.
 
     Args:
+        layout: of the points.
         neutral: (n, 2) px of the face at rest.
         known: indices of points, none twice.
         positions: (k, 2) px of any picture.
@@ -71,8 +83,8 @@ def look_mirrored(
     """
     known, positions = check_known(known, positions, len(neutral))
     width = face_width(layout, neutral)
-    as_given = _misfit(neutral[known], positions) / width
-    exchanged = _misfit(neutral[layout.mirror[known]], positions) / width
+    as_given = _alignment_rms(neutral[known], positions) / width
+    exchanged = _alignment_rms(neutral[layout.mirror[known]], positions) / width
     return as_given > 0.05 and exchanged < as_given / 2
 
 
@@ -81,11 +93,12 @@ def head_moved(
 ) -> bool:
     """Whether a head that moved explains the points better than an expression alone.
 
-    Both are compared by how likely they make the points: displacements as the statistics have
-    them, twice as large, or those of a head that moved and turned in the plane as well. Few points
-    tell little: then small movements are taken for expressions.
+    Compares the likelihood of the points under two normal distributions: displacements of the
+    statistics, twice as large, without and with a motion of the head in the image plane. With few
+    points, small motions are taken for expressions.
 
     Args:
+        examples: of the person.
         known: indices of points, none twice.
         positions: (k, 2) px of the neutral photo.
 
@@ -95,62 +108,66 @@ def head_moved(
     neutral = examples.neutral.points
     known, positions = check_known(known, positions, len(neutral))
     width = face_width(examples.layout, neutral)
-    seen = (examples.statistics - neutral)[:, known].reshape(len(examples.statistics), -1) / width
-    given = ((positions - neutral[known]) / width).ravel() - seen.mean(axis=0)
-    still = _BEYOND**2 * _spread(seen)
-    motions = _motions(neutral / width)[:, known].reshape(4, -1)
-    return _likelihood(given, still + motions.T @ motions) > _likelihood(given, still)
+    statistics = (examples.statistics - neutral)[:, known]
+    statistics = statistics.reshape(len(examples.statistics), -1) / width
+    centred = ((positions - neutral[known]) / width).ravel() - statistics.mean(axis=0)
+    still = _STILL_SCALE**2 * _covariance(statistics)
+    motions = _motion_basis(neutral / width)[:, known].reshape(4, -1)
+    moved = still + motions.T @ motions
+    return _log_likelihood(centred, moved) > _log_likelihood(centred, still)
 
 
-def oddness(examples: ExampleSet, points: Float[Array, "n 2"]) -> float | None:
-    """How far a face's points are from what was seen of the person, in usual deviations.
+def mahalanobis_rms(examples: ExampleSet, points: Float[Array, "n 2"]) -> float | None:
+    """How far a face's points are from the statistics of the person, in standard deviations.
 
     Args:
+        examples: of the person.
         points: (n, 2) px of any photo.
 
     Returns:
-        the root of the mean square; from `STRANGER` on, points are likelier another person's. None
-        where the statistics are too few to tell.
+        the Mahalanobis distance over the root of the count of numbers; from `OUTLIER_RMS` on, the
+        points are likelier another person's. None with fewer than `MIN_STATISTICS`.
 
     Raises:
         InputError: shape, NaN.
         EstimationError: all points in one place.
     """
-    if len(examples.statistics) < ENOUGH_STATISTICS:
+    if len(examples.statistics) < MIN_STATISTICS:
         return None
-    middle = examples.statistics.mean(axis=0)
-    width = face_width(examples.layout, middle)
-    seen, _ = compensated(examples.statistics, middle)
-    geometry, _ = compensated(points, middle)
-    apart = ((geometry - middle) / width).ravel()
-    spread = _spread((seen - middle).reshape(len(seen), -1) / width)
-    return float(np.sqrt(apart @ np.linalg.solve(spread, apart) / apart.size))
+    mean = examples.statistics.mean(axis=0)
+    width = face_width(examples.layout, mean)
+    statistics, _ = align_to_neutral(examples.statistics, mean)
+    geometry, _ = align_to_neutral(points, mean)
+    centred = ((geometry - mean) / width).ravel()
+    covariance = _covariance((statistics - mean).reshape(len(statistics), -1) / width)
+    return float(np.sqrt(centred @ np.linalg.solve(covariance, centred) / centred.size))
 
 
-def _misfit(source: Float[Array, "k 2"], target: Float[Array, "k 2"]) -> float:
+def _alignment_rms(source: Float[Array, "k 2"], target: Float[Array, "k 2"]) -> float:
     """Root of the mean squared distance after the best motion, in the source's px."""
     if len(source) < 2:
         raise InputError("known", "at least 2 points", len(source))
-    apart = estimate_planar_motion(source, target).undo(target) - source
-    return float(np.sqrt((apart**2).sum(axis=1).mean()))
+    residual = estimate_planar_motion(source, target).undo(target) - source
+    return float(np.sqrt((residual**2).sum(axis=1).mean()))
 
 
-def _spread(rows: Float[Array, "n d"]) -> Float[Array, "d d"]:
-    """Covariance about the mean, and the least spread in every number."""
-    apart = rows - rows.mean(axis=0)
-    return apart.T @ apart / len(rows) + _LEAST_SPREAD**2 * np.eye(rows.shape[1])
+def _covariance(rows: Float[Array, "n d"]) -> Float[Array, "d d"]:
+    """Covariance about the mean, with the floor's variance added to every number."""
+    centred = rows - rows.mean(axis=0)
+    return centred.T @ centred / len(rows) + _DEVIATION_FLOOR**2 * np.eye(rows.shape[1])
 
 
-def _motions(points: Float[Array, "n 2"]) -> Float[Array, "4 n 2"]:
-    """What the head's growth, turn, and shifts, each by what is usual, do to the points."""
+def _motion_basis(points: Float[Array, "n 2"]) -> Float[Array, "4 n 2"]:
+    """Displacements by one standard deviation of the head's scale, rotation, and two shifts."""
     x, y = (points - points.mean(axis=0)).T
     one, zero = np.ones_like(x), np.zeros_like(x)
-    ways = [(x, y), (-y, x), (one, zero), (zero, one)]
-    usual = [_TURN, _TURN, _SHIFT, _SHIFT]
-    return np.stack([by * np.stack(way, axis=-1) for by, way in zip(usual, ways, strict=True)])
+    directions = [(x, y), (-y, x), (one, zero), (zero, one)]
+    deviations = [_ROTATION_DEVIATION, _ROTATION_DEVIATION, _SHIFT_DEVIATION, _SHIFT_DEVIATION]
+    pairs = zip(deviations, directions, strict=True)
+    return np.stack([deviation * np.stack(direction, axis=-1) for deviation, direction in pairs])
 
 
-def _likelihood(given: Float[Array, " d"], covariance: Float[Array, "d d"]) -> float:
-    """Logarithm of a normal density, but for what all have in common."""
-    size = np.linalg.slogdet(covariance)[1]
-    return float(-0.5 * (given @ np.linalg.solve(covariance, given) + size))
+def _log_likelihood(centred: Float[Array, " d"], covariance: Float[Array, "d d"]) -> float:
+    """Logarithm of a normal density without its constant term."""
+    log_determinant = np.linalg.slogdet(covariance)[1]
+    return float(-0.5 * (centred @ np.linalg.solve(covariance, centred) + log_determinant))

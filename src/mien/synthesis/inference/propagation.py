@@ -11,9 +11,14 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, Int, check_array, check_positive, frozen
 from mien.errors import InputError
 from mien.numeric.pca import Pca, fit_pca
-from mien.synthesis.inference.inferred import LEAST_NOISE, Inferred, check_known, check_statistics
+from mien.synthesis.inference.displacement_model import (
+    MIN_NOISE,
+    InferredMotion,
+    check_known,
+    check_statistics,
+)
 
-__all__ = ["COMPONENTS", "PointSets", "Propagation", "visiting_order"]
+__all__ = ["COMPONENTS", "MotionPropagation", "PointSets", "visiting_order"]
 
 COMPONENTS = (20, 15, 15)
 """Of the sets of each hierarchy. [Zhang 2006] keeps 5 to 10 of 30 to 40 images; clips have more."""
@@ -23,17 +28,19 @@ PointSets = Sequence[Sequence[Int[Array, " s"]]]
 
 
 class HasPointSets(Protocol):
-    """A layout of feature points: all that is asked of it here."""
+    """A layout of feature points."""
 
     @property
-    def sets(self) -> PointSets: ...
+    def sets(self) -> PointSets:
+        """Of its points, by hierarchy."""
+        ...
 
 
-class Propagation:
-    """Motion propagation: projections onto what is usual for sets of points, in turn.
+class MotionPropagation:
+    """Motion propagation: projections onto the principal components of sets of points, in turn.
 
     Each iteration puts the known displacements back and projects one set after another onto its
-    principal components, so that what some points do spreads from the sets they are in, across
+    principal components. So the motion of known points spreads from the sets they are in, across
     hierarchies, to those that share points with them.
 
     Args:
@@ -42,14 +49,14 @@ class Propagation:
             head motion compensated, px in a picture and mm in space; N >= 2.
         components: how many principal components the sets keep: one number, or one for each
             hierarchy.
-        trust: what the known points of a set weigh together when it is projected, where all its
-            points at one each weigh 1, and none less than one; 0 is as printed. With more, what was
-            given lasts longer than what was guessed, and fewer iterations are needed.
-        prior: the weight of how usual a displacement is, with what the components leave as the
-            noise; 0 is as printed, 1 the most likely displacement for normally distributed ones.
+        known_weight: in the projection of a set, the total weight of its known points, where all
+            its points at 1 each weigh 1, and none less than 1; 0 is as printed. With more, the
+            known displacements last longer than the inferred ones, and fewer iterations are needed.
+        prior_weight: of the normal distribution of the components' weights, with what the
+            components leave as the noise; 0 is as printed, 1 gives the most likely displacements.
             With it, more components do good where they overfit without.
-        threshold: px or mm; the propagation stops when an iteration changes what it makes of the
-            known points by less than this, on the average of two.
+        threshold: px or mm; the propagation stops when an iteration changes the displacements of
+            the known points by less than this, on the average of two.
         max_iterations: it stops after so many in any case.
 
     Raises:
@@ -59,7 +66,7 @@ class Propagation:
     Source:
         [Zhang 2006] sec. 10 and 10.1. Left open there: components are about the mean; siblings are
         visited in the order of the layout; progress is how far the points of T moved since the
-        iteration before. `trust` and `prior` go beyond it.
+        iteration before. `known_weight` and `prior_weight` go beyond it.
     """
 
     def __init__(
@@ -68,23 +75,23 @@ class Propagation:
         statistics: Float[Array, "m n d"],
         *,
         components: int | Sequence[int] = COMPONENTS,
-        trust: float = 0.0,
-        prior: float = 0.0,
+        known_weight: float = 0.0,
+        prior_weight: float = 0.0,
         threshold: float = 1e-3,
         max_iterations: int = 50,
     ) -> None:
         statistics = check_statistics(statistics)
         self._shape = statistics.shape[1:]
         self._sets = _check_sets(layout.sets, len(statistics[0]))
-        self._trust = _check_not_negative("trust", trust)
-        self._prior = _check_not_negative("prior", prior)
+        self._known_weight = _check_not_negative("known_weight", known_weight)
+        self._prior_weight = _check_not_negative("prior_weight", prior_weight)
         self._threshold = check_positive("threshold", threshold)
         if max_iterations < 1:
             raise InputError("max_iterations", "a number from 1 on", max_iterations)
         self._max_iterations = max_iterations
-        self._statistics = _fitted(statistics, self._sets, components)
+        self._components = _fit_components(statistics, self._sets, components)
 
-    def infer(self, known: Int[Array, " k"], displacements: Float[Array, "k d"]) -> Inferred:
+    def infer(self, known: Int[Array, " k"], displacements: Float[Array, "k d"]) -> InferredMotion:
         """The displacements of all points from those of some, in any order.
 
         Points that no set contains or that no chain of sets joins to the known ones do not move.
@@ -111,27 +118,28 @@ class Propagation:
                 projection.update(moved)
             errors.append(_distance(moved[known], given))
             progress.append(_distance(moved[known], before))
-        return Inferred(frozen(moved), frozen(np.array(errors)))
+        return InferredMotion(frozen(moved), frozen(np.array(errors)))
 
     def _projections(self, known: Int[Array, " k"]) -> list[_Projection]:
-        """One for each set that is reached, in the order in which they are done."""
-        given = np.isin(np.arange(self._shape[0]), known)
+        """One for each set that is reached, in the order of an iteration."""
+        is_known = np.isin(np.arange(self._shape[0]), known)
         return [
-            self._projection(self._sets[level][index], self._statistics[level][index], given)
+            self._projection(self._sets[level][index], self._components[level][index], is_known)
             for level, index in visiting_order(self._sets, known)
         ]
 
     def _projection(
-        self, points: Int[Array, " s"], pca: Pca, given: Bool[Array, " n"]
+        self, points: Int[Array, " s"], pca: Pca, is_known: Bool[Array, " n"]
     ) -> _Projection:
-        """Least squares over the set, known points weighted, coefficients held by the prior."""
-        known = np.count_nonzero(given[points])
-        weight = max(1.0, self._trust * len(points) / known) if known else 1.0
-        weighted = pca.components * np.repeat(np.where(given[points], weight, 1.0), self._shape[1])
-        # Relative to the noise of known points, so that trust leaves their balance with the prior.
-        noise = weight * max(pca.residual, LEAST_NOISE) ** 2
-        held = np.diag(self._prior * noise / pca.deviations**2)
-        gain = np.linalg.solve(weighted @ pca.components.T + held, weighted)
+        """Weighted, regularised least squares over the numbers of a set."""
+        count = np.count_nonzero(is_known[points])
+        weight = max(1.0, self._known_weight * len(points) / count) if count else 1.0
+        weights = np.repeat(np.where(is_known[points], weight, 1.0), self._shape[1])
+        weighted = pca.components * weights
+        # Relative to the noise of known points, so that their weight leaves that of the prior.
+        noise = weight * max(pca.residual, MIN_NOISE) ** 2
+        regularisation = np.diag(self._prior_weight * noise / pca.deviations**2)
+        gain = np.linalg.solve(weighted @ pca.components.T + regularisation, weighted)
         return _Projection(points, pca.mean, gain, pca.components)
 
     def _stops(self, progress: Sequence[float]) -> bool:
@@ -143,7 +151,7 @@ class Propagation:
 
 @dataclass(frozen=True)
 class _Projection:
-    """Proj(dV, F): what is usual for a set of points and nearest to what they do."""
+    """Proj(dV, F): the displacements of a set in the span of its components that fit best."""
 
     points: Int[Array, " s"]
     mean: Float[Array, " d"]
@@ -151,10 +159,10 @@ class _Projection:
     components: Float[Array, "c d"]
 
     def update(self, moved: Float[Array, "n d"]) -> None:
-        """Replaces the displacements of the set's points, in place."""
+        """Replace the displacements of the set's points, in place."""
         weights = self.gain @ (moved[self.points].ravel() - self.mean)
-        usual = self.mean + weights @ self.components
-        moved[self.points] = usual.reshape(len(self.points), -1)
+        projected = self.mean + weights @ self.components
+        moved[self.points] = projected.reshape(len(self.points), -1)
 
 
 def visiting_order(sets: PointSets, known: Int[Array, " k"]) -> list[tuple[int, int]]:
@@ -162,29 +170,36 @@ def visiting_order(sets: PointSets, known: Int[Array, " k"]) -> list[tuple[int, 
 
     It depends only on which sets share points, so once is enough for all iterations.
 
+    Args:
+        sets: of points, by hierarchy.
+        known: indices of points.
+
     Raises:
         InputError: no set contains a known point.
 
     Source:
         [Zhang 2006] sec. 10.1, `MotionPropagationFeaturePointSet` with its flag hasBeenProcessed.
     """
-    places = [(level, index) for level, of in enumerate(sets) for index in range(len(of))]
-    members = {place: set(sets[place[0]][place[1]].tolist()) for place in places}
-    beginnings = [place for place in places if members[place] & set(known.tolist())]
-    if not beginnings:
+    members = {
+        (level, index): set(points.tolist())
+        for level, of_level in enumerate(sets)
+        for index, points in enumerate(of_level)
+    }
+    start = next((node for node in members if members[node] & set(known.tolist())), None)
+    if start is None:
         raise InputError("known", "a point that belongs to a set of points", known.tolist())
     processed: list[tuple[int, int]] = []
 
-    def propagate(place: tuple[int, int]) -> None:
-        if place in processed:
+    def propagate(node: tuple[int, int]) -> None:
+        if node in processed:
             return
-        processed.append(place)
-        for level in (place[0] - 1, place[0] + 1):
-            for other in places:
-                if other[0] == level and members[other] & members[place]:
+        processed.append(node)
+        for level in (node[0] - 1, node[0] + 1):
+            for other in members:
+                if other[0] == level and members[other] & members[node]:
                     propagate(other)
 
-    propagate(beginnings[0])
+    propagate(start)
     return processed
 
 
@@ -198,7 +213,9 @@ def _check_sets(sets: PointSets, count: int) -> list[list[Int[Array, " s"]]]:
     return checked
 
 
-def _fitted(statistics: Array, sets: PointSets, components: int | Sequence[int]) -> list[list[Pca]]:
+def _fit_components(
+    statistics: Array, sets: PointSets, components: int | Sequence[int]
+) -> list[list[Pca]]:
     """Each set's principal components."""
     counts = [components] * len(sets) if isinstance(components, int) else list(components)
     if len(counts) != len(sets):
@@ -216,5 +233,5 @@ def _check_not_negative(name: str, value: float) -> float:
     return number
 
 
-def _distance(found: Array, given: Array) -> float:
-    return float(np.linalg.norm(found - given, axis=1).mean())
+def _distance(a: Array, b: Array) -> float:
+    return float(np.linalg.norm(a - b, axis=1).mean())

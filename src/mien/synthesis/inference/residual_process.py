@@ -1,4 +1,4 @@
-"""Points that are given where nobody saw them: how far a face bends to follow."""
+"""A Gaussian process over the face, for displacements unlike those of the statistics."""
 
 from __future__ import annotations
 
@@ -6,61 +6,65 @@ import numpy as np
 
 from mien.arrays import Array, Float, check_array
 
-__all__ = ["closeness", "least_bend"]
+__all__ = ["matern32", "smallest_variance"]
 
-_REACH = 0.2
-"""Of a bend, in the unit of the places: face widths."""
+_LENGTH_SCALE = 0.2
+"""Face widths."""
 
 
-def closeness(places: Float[Array, "n 2"]) -> Float[Array, "n n"]:
-    """How much points bend together: 1 with themselves, falling with the distance.
+def matern32(points: Float[Array, "n 2"]) -> Float[Array, "n n"]:
+    """Correlation of the residual displacements of points: 1 at distance 0, then falling.
 
     Args:
-        places: (n, 2) in widths of the face.
+        points: (n, 2) in widths of the face.
 
     Raises:
         InputError: shape, NaN.
 
     Source:
-        the covariance of Matern with smoothness 3/2: once differentiable, so that bends have no
-        edges, and well conditioned for points side by side.
+        the Matern covariance with smoothness 3/2: once differentiable, so that the displacements
+        have no creases, and well conditioned for points side by side.
     """
-    places = check_array("places", places, (None, 2))
-    apart = np.sqrt(3) * np.linalg.norm(places[:, None] - places, axis=2) / _REACH
-    return (1 + apart) * np.exp(-apart)
+    points = check_array("points", points, (None, 2))
+    scaled = np.sqrt(3) * np.linalg.norm(points[:, None] - points, axis=2) / _LENGTH_SCALE
+    return (1 + scaled) * np.exp(-scaled)
 
 
-def least_bend(
-    usual: Float[Array, "q q"],
-    bend: Float[Array, "q q"],
-    given: Float[Array, " q"],
-    most: float,
+def smallest_variance(
+    covariance: Float[Array, "q q"],
+    correlation: Float[Array, "q q"],
+    residual: Float[Array, " q"],
+    max_deviations: float,
 ) -> tuple[float, Float[Array, " q"]]:
-    """How large bends must be for what is given to be no more than so many deviations away.
+    """The least variance of the process that makes the observations likely enough.
 
     Args:
-        usual: (q, q) covariance of the given numbers.
-        bend: (q, q) covariance of a bend of size 1.
-        given: (q,) less their mean, with more than `most` usual deviations.
-        most: root of the mean square, in deviations.
+        covariance: (q, q) of the observed numbers under the statistics.
+        correlation: (q, q) of the process at them.
+        residual: (q,) the observed numbers less their mean, more than `max_deviations` under
+            `covariance` alone.
+        max_deviations: root mean square of the whitened residual, in standard deviations.
 
     Returns:
-        the variance s of bends at which it is just `most`; (q,) (usual + s bend)^-1 given.
+        the variance s at which it is just `max_deviations`; (q,) (covariance + s correlation)^-1
+        residual.
     """
-    factor = np.linalg.cholesky(usual)
-    inner = np.linalg.solve(factor, np.linalg.solve(factor, bend).T)
-    spread, turn = np.linalg.eigh(inner)
-    spread = np.maximum(spread, 0)
-    along = turn.T @ np.linalg.solve(factor, given)
+    factor = np.linalg.cholesky(covariance)
+    whitened = np.linalg.solve(factor, np.linalg.solve(factor, correlation).T)
+    eigenvalues, eigenvectors = np.linalg.eigh(whitened)
+    eigenvalues = np.maximum(eigenvalues, 0)
+    projected = eigenvectors.T @ np.linalg.solve(factor, residual)
     low, high = 0.0, 1.0
-    while _deviations(along, spread, high) > most and high < 1e30:
+    while _deviations(projected, eigenvalues, high) > max_deviations and high < 1e30:
         low, high = high, 4 * high
     for _ in range(50):
         middle = (low + high) / 2
-        low, high = (middle, high) if _deviations(along, spread, middle) > most else (low, middle)
-    weights: Array = np.linalg.solve(factor.T, turn @ (along / (1 + high * spread)))
+        above = _deviations(projected, eigenvalues, middle) > max_deviations
+        low, high = (middle, high) if above else (low, middle)
+    scaled = projected / (1 + high * eigenvalues)
+    weights: Array = np.linalg.solve(factor.T, eigenvectors @ scaled)
     return high, weights
 
 
-def _deviations(along: Array, spread: Array, variance: float) -> float:
-    return float(np.sqrt(np.mean(along**2 / (1 + variance * spread))))
+def _deviations(projected: Array, eigenvalues: Array, variance: float) -> float:
+    return float(np.sqrt(np.mean(projected**2 / (1 + variance * eigenvalues))))

@@ -18,7 +18,13 @@ from mien.errors import OtherPointsError
 from mien.io.landmarks.points_file import read_points
 from mien.reading.strict_json import read_json
 
-__all__ = ["all_with_marks", "mark_files", "mark_notes", "read_marks", "with_marks"]
+__all__ = [
+    "annotation_files",
+    "annotation_notes",
+    "apply_all_annotations",
+    "apply_annotations",
+    "read_annotated_points",
+]
 
 OF_HEADS = tuple(
     [f"{side}_{part}" for side in ("right", "left") for part in ("eye_outer", "eye_inner")]
@@ -32,18 +38,20 @@ REACH = 0.12
 Marks = Mapping[str, Float[Array, " 2"]]
 
 
-def read_marks(file: Path, photo: Photo, layout: FeatureLayout) -> dict[str, Float[Array, " 2"]]:
+def read_annotated_points(
+    file: Path, photo: Photo, layout: FeatureLayout
+) -> dict[str, Float[Array, " 2"]]:
     """Hand-made marks beside a photo, by point, in px of the photo as loaded.
 
     Looked for in `STEM.tem` and `STEM.pts` beside it and in `annotations/STEM.json`, either
     `{"layout": ..., "points": ...}` or marks as `mien build` uses them; where two of these mark
     the same point, the later one counts. All are in px of the photo's file, turned upright. A file
-    of points that mien does not know is left out; `mark_notes` tells.
+    of points that mien does not know is left out; `annotation_notes` tells.
 
     Raises:
         FileFormatError: one of them is damaged; says where.
     """
-    sources = mark_files(file)
+    sources = annotation_files(file)
     for_heads = [path for path in sources if _is_for_heads(path)]
     found: dict[str, Array] = {}
     for path in (path for path in sources if path not in for_heads):
@@ -57,14 +65,14 @@ def read_marks(file: Path, photo: Photo, layout: FeatureLayout) -> dict[str, Flo
     return found
 
 
-def mark_notes(file: Path, layout: FeatureLayout) -> list[str]:
+def annotation_notes(file: Path, layout: FeatureLayout) -> list[str]:
     """Which files beside a photo hold points that mien does not know.
 
     Raises:
         FileFormatError: one of them is damaged.
     """
     notes = []
-    for path in mark_files(file):
+    for path in annotation_files(file):
         try:
             if not _is_for_heads(path):
                 read_points(path, layout)
@@ -73,7 +81,7 @@ def mark_notes(file: Path, layout: FeatureLayout) -> list[str]:
     return notes
 
 
-def mark_files(file: Path) -> list[Path]:
+def annotation_files(file: Path) -> list[Path]:
     """Where a photo's marks are, those that count most last."""
     annotations = file.parent / ANNOTATIONS / f"{file.stem}.json"
     places = (file.with_suffix(".tem"), file.with_suffix(".pts"), annotations)
@@ -84,7 +92,7 @@ def _is_for_heads(path: Path) -> bool:
     return path.suffix == ".json" and "layout" not in read_json(path)
 
 
-def with_marks(
+def apply_annotations(
     layout: FeatureLayout, points: Float[Array, "n 2"], marks: Marks
 ) -> Float[Array, "n 2"]:
     """Detected points with marked ones in their places; neighbours follow, less the farther."""
@@ -100,11 +108,11 @@ def with_marks(
     return result
 
 
-def all_with_marks(
+def apply_all_annotations(
     layout: FeatureLayout, points: Float[Array, "N n 2"], marks: Mapping[int, Marks]
 ) -> Float[Array, "N n 2"]:
     """Detected points of all pictures; marks, by row, win."""
     result: Array = points.copy()
     for row, found in marks.items():
-        result[row] = with_marks(layout, points[row], found)
+        result[row] = apply_annotations(layout, points[row], found)
     return result

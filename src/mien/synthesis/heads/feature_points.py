@@ -12,9 +12,9 @@ from mien.assets.feature_points import load_feature_layout
 from mien.assets.generic import load_generic_head
 from mien.reconstruction.dense.surface import cotangent_laplacian
 from mien.rig.followers import part_vertices
-from mien.synthesis.heads.skin import inside_of_face, spread_over_skin
+from mien.synthesis.heads.skin_interpolation import behind_lips_and_lids, harmonic_extension
 
-__all__ = ["feature_points_on", "skin_with_points"]
+__all__ = ["feature_points_on", "thin_plate_weights"]
 
 _REACH_MM = 20.0
 """Far from all points a movement fades over so much."""
@@ -36,7 +36,7 @@ def feature_points_on(vertices: Float[Array, "*batch v 3"]) -> Float[Array, "*ba
 
 
 @cache
-def skin_with_points() -> Float[Array, "v n"]:
+def thin_plate_weights() -> Float[Array, "v n"]:
     """(V, n) by how much each vertex moves with each feature point; eyeballs and teeth do not.
 
     The skin bends as little as it can; a movement of all points alike is one of the face. What
@@ -60,7 +60,7 @@ def skin_with_points() -> Float[Array, "v n"]:
     moved[skin] = factors.solve(_HELD * mixes.T)
     outside = np.zeros(len(moved), bool)
     outside[skin] = True
-    return frozen(spread_over_skin(moved, outside & ~inside_of_face()))
+    return frozen(harmonic_extension(moved, outside & ~behind_lips_and_lids()))
 
 
 def _mixes_of_vertices() -> Float[Array, "n v"]:

@@ -16,9 +16,9 @@ from mien.capture.faces.face_series import FaceSeries
 from mien.capture.images.photos import Photo
 from mien.capture.video.frame_selection import FrameScores
 from mien.errors import InputError
-from mien.synthesis.examples.gathering import (
+from mien.synthesis.examples.example_plan import (
     ExamplePlan,
-    Wishes,
+    SelectionOverrides,
     build_examples,
     lip_gaps,
     plan_examples,
@@ -98,7 +98,7 @@ def test_the_motion_of_the_head_is_no_expression(layout: FeatureLayout, points: 
 
 
 def test_everything_can_be_overruled(layout: FeatureLayout, points: Array) -> None:
-    wishes = Wishes(neutral=0, standard=4, include=(5, 0), exclude=(3,))
+    wishes = SelectionOverrides(neutral=0, standard=4, include=(5, 0), exclude=(3,))
     plan = plan_examples(layout, series_of(), points, wishes=wishes)
     assert chosen(plan) == [0, 4, 5, 2]
     assert plan.standard == 1
@@ -109,7 +109,9 @@ def test_everything_can_be_overruled(layout: FeatureLayout, points: Array) -> No
 
 def test_wishes_that_contradict_each_other(layout: FeatureLayout, points: Array) -> None:
     with pytest.raises(InputError, match="exclude: expected others than those that are wanted"):
-        plan_examples(layout, series_of(), points, wishes=Wishes(include=(3,), exclude=(3,)))
+        plan_examples(
+            layout, series_of(), points, wishes=SelectionOverrides(include=(3,), exclude=(3,))
+        )
 
 
 def test_unfit_and_blurred_ones_are_neither_rest_nor_standard_nor_statistics(

@@ -14,7 +14,11 @@ from mien.capture.images.photos import Photo
 from mien.errors import FileFormatError
 from mien.io.landmarks.pts import points_to_ibug, write_pts
 from mien.io.landmarks.tem import points_to_tem, write_tem
-from mien.pipelines.example_marks import mark_notes, read_marks, with_marks
+from mien.pipelines.example_annotations import (
+    annotation_notes,
+    apply_annotations,
+    read_annotated_points,
+)
 
 
 @pytest.fixture(scope="module")
@@ -42,20 +46,20 @@ def annotate(photo: Photo, **data: object) -> None:
 
 
 def test_no_marks(layout: FeatureLayout, points: Array, photo: Photo) -> None:
-    assert read_marks(photo.path, photo, layout) == {}
-    assert with_marks(layout, points, {}) is points
+    assert read_annotated_points(photo.path, photo, layout) == {}
+    assert apply_annotations(layout, points, {}) is points
 
 
 def test_all_points_from_a_delineation(layout: FeatureLayout, points: Array, photo: Photo) -> None:
     write_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
-    marks = read_marks(photo.path, photo, layout)
-    found = with_marks(layout, 100 + 0 * points + layout.template, marks)
+    marks = read_annotated_points(photo.path, photo, layout)
+    found = apply_annotations(layout, 100 + 0 * points + layout.template, marks)
     np.testing.assert_allclose(found, points / 2, atol=1e-3)
 
 
 def test_some_points_from_ibug(layout: FeatureLayout, points: Array, photo: Photo) -> None:
     write_pts(photo.path.with_suffix(".pts"), points_to_ibug(layout, points))
-    marks = read_marks(photo.path, photo, layout)
+    marks = read_annotated_points(photo.path, photo, layout)
     assert 30 <= len(marks) <= 40
     for name, place in marks.items():
         np.testing.assert_allclose(place, points[layout.index(name)] / 2, atol=1e-3)
@@ -63,7 +67,7 @@ def test_some_points_from_ibug(layout: FeatureLayout, points: Array, photo: Phot
 
 def test_points_of_the_layout_in_json(layout: FeatureLayout, photo: Photo) -> None:
     annotate(photo, layout=layout.name, points={"chin": [200, 500], "right_jaw.0": [150, 480]})
-    marks = read_marks(photo.path, photo, layout)
+    marks = read_annotated_points(photo.path, photo, layout)
     np.testing.assert_array_equal(marks["chin"], [100, 250])
     np.testing.assert_array_equal(marks["right_jaw.0"], [75, 240])
 
@@ -73,7 +77,7 @@ def test_marks_made_for_a_head_count_where_they_mean_the_same(
 ) -> None:
     """`left_jaw.3` is another place on the head than among the feature points."""
     annotate(photo, points={"nose_tip": [200, 300], "left_jaw.3": [250, 480], "chin": [200, 500]})
-    marks = read_marks(photo.path, photo, layout)
+    marks = read_annotated_points(photo.path, photo, layout)
     assert list(marks) == ["nose_tip"]
     np.testing.assert_array_equal(marks["nose_tip"], [100, 150])
 
@@ -83,7 +87,7 @@ def test_json_counts_more_than_a_delineation(
 ) -> None:
     write_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
     annotate(photo, layout=layout.name, points={"chin": [10, 20]})
-    np.testing.assert_array_equal(read_marks(photo.path, photo, layout)["chin"], [5, 10])
+    np.testing.assert_array_equal(read_annotated_points(photo.path, photo, layout)["chin"], [5, 10])
 
 
 @pytest.mark.parametrize(
@@ -101,17 +105,17 @@ def test_broken_marks(
 ) -> None:
     annotate(photo, **data)
     with pytest.raises(FileFormatError, match=message) as caught:
-        read_marks(photo.path, photo, layout)
+        read_annotated_points(photo.path, photo, layout)
     assert "anna.json" in str(caught.value)
 
 
 def test_points_of_other_kinds_are_noted_and_not_used(layout: FeatureLayout, photo: Photo) -> None:
     annotate(photo, layout=layout.name, points={"chin": [200, 500]})
-    assert mark_notes(photo.path, layout) == []
+    assert annotation_notes(photo.path, layout) == []
     photo.path.with_suffix(".tem").write_text("2\n1 2\n3 4\n0\n")
     write_pts(photo.path.with_suffix(".pts"), np.zeros((5, 2)))
-    assert list(read_marks(photo.path, photo, layout)) == ["chin"]
-    template, ibug = mark_notes(photo.path, layout)
+    assert list(read_annotated_points(photo.path, photo, layout)) == ["chin"]
+    template, ibug = annotation_notes(photo.path, layout)
     assert template.startswith("anna.tem is not used: expected 134 points (zhang134), 7 (dlib's 5")
     assert template.endswith(", found 2")
     assert ibug == "anna.pts is not used: expected iBUG's 68 points, found 5"
@@ -120,8 +124,8 @@ def test_points_of_other_kinds_are_noted_and_not_used(layout: FeatureLayout, pho
 def test_a_damaged_delineation_is_no_other_kind(layout: FeatureLayout, photo: Photo) -> None:
     photo.path.with_suffix(".tem").write_text("2\n1 2\n3 x\n0\n")
     for read in (
-        lambda: read_marks(photo.path, photo, layout),
-        lambda: mark_notes(photo.path, layout),
+        lambda: read_annotated_points(photo.path, photo, layout),
+        lambda: annotation_notes(photo.path, layout),
     ):
         with pytest.raises(FileFormatError, match=r"anna\.tem: line 3: expected a finite number"):
             read()
@@ -130,7 +134,7 @@ def test_a_damaged_delineation_is_no_other_kind(layout: FeatureLayout, photo: Ph
 def test_neighbours_follow_and_the_far_stay(layout: FeatureLayout, points: Array) -> None:
     corner = layout.index("right_mouth_corner")
     moved = np.array([6.0, -4.0])
-    found = with_marks(layout, points, {"right_mouth_corner": points[corner] + moved})
+    found = apply_annotations(layout, points, {"right_mouth_corner": points[corner] + moved})
     steps = (found - points) @ moved / (moved @ moved)
     assert steps[corner] == pytest.approx(1, abs=1e-12)
     assert steps[layout.index("right_inner_mouth_corner")] > 0.8
@@ -142,5 +146,5 @@ def test_neighbours_follow_and_the_far_stay(layout: FeatureLayout, points: Array
 def test_marks_that_agree_move_all_between_them_alike(layout: FeatureLayout, points: Array) -> None:
     names = [name for name in layout.names if name != "chin"]
     marks = {name: points[layout.index(name)] + [3, 1] for name in names}
-    found = with_marks(layout, points, marks)
+    found = apply_annotations(layout, points, marks)
     np.testing.assert_allclose(found - points, np.tile([3, 1], (len(points), 1)), atol=0.2)

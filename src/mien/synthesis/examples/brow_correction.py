@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int, UInt8
 from mien.assets.feature_points import FeatureLayout
 
-__all__ = ["detected_points", "on_brows"]
+__all__ = ["correct_brows", "detected_points"]
 
 _RAISED = np.arange(0, 0.1001, 0.005)
 """How far an end of a brow may lie above its points, in widths of the face."""
@@ -49,10 +49,10 @@ def detected_points(
     Raises:
         InputError: shapes, NaN.
     """
-    return on_brows(layout, pixels, layout.from_landmarks(landmarks))
+    return correct_brows(layout, pixels, layout.from_landmarks(landmarks))
 
 
-def on_brows(
+def correct_brows(
     layout: FeatureLayout, pixels: UInt8[Array, "h w 3"], points: Float[Array, "n 2"]
 ) -> Float[Array, "n 2"]:
     """Points with each brow raised, and turned, to where it is darkest beside the skin around.

@@ -17,8 +17,8 @@ from mien.capture.folder import NEUTRAL
 from mien.capture.images.photos import Photo
 from mien.capture.video.frame_selection import FrameScores, choose_frames
 from mien.synthesis.examples.example_set import Example, ExampleSet
-from mien.synthesis.examples.exposure import evened
-from mien.synthesis.examples.head_alignment import compensated
+from mien.synthesis.examples.exposure import equalize_exposure
+from mien.synthesis.examples.head_alignment import align_to_neutral
 from mien.synthesis.examples.selection import (
     COUNT,
     DETECTOR_NOISE,
@@ -27,21 +27,21 @@ from mien.synthesis.examples.selection import (
     choose_examples,
 )
 
-__all__ = ["ExamplePlan", "Wishes", "build_examples", "lip_gaps", "plan_examples"]
+__all__ = ["ExamplePlan", "SelectionOverrides", "build_examples", "lip_gaps", "plan_examples"]
 
 ASKED_FOR = "as asked for"
-DIFFERENT = 3.0
+MIN_DIFFERENCE = 3.0
 """Two examples differ in some subregion by so many times the detector's noise. On three quiet clips
 held-out pictures are as near with 3 as without any such limit (18, 40 and 19 examples instead of
 33, 40 and 30, within 0.15 dB); 5 costs up to 0.8 dB, 8 up to 2.3."""
-MOST_STATISTICS = 2000
+MAX_STATISTICS = 2000
 """More sound pictures than these are thinned out evenly: their covariance stays the same."""
-TEETH_SHOW = 0.03
+TEETH_GAP = 0.03
 """Gap of the lips, in widths of the face, from which on teeth can be seen between them."""
 
 
 @dataclass(frozen=True)
-class Wishes:
+class SelectionOverrides:
     """What the user wants otherwise; rows of the series.
 
     Attributes:
@@ -83,8 +83,8 @@ class ExamplePlan:
         used = self.choice.sound.copy()
         used[self.choice.rows] = True
         rows = np.flatnonzero(used)
-        thin = np.unique(np.rint(np.linspace(0, len(rows) - 1, MOST_STATISTICS)).astype(int))
-        return self.geometries[rows[thin] if len(rows) > MOST_STATISTICS else rows]
+        thin = np.unique(np.rint(np.linspace(0, len(rows) - 1, MAX_STATISTICS)).astype(int))
+        return self.geometries[rows[thin] if len(rows) > MAX_STATISTICS else rows]
 
     def with_points(self, points: Mapping[int, Float[Array, "n 2"]]) -> ExamplePlan:
         """The same with better points in some pictures, the examples' among them.
@@ -97,8 +97,8 @@ class ExamplePlan:
         rows, better = list(points), self.points.copy()
         better[rows] = list(points.values())
         neutral = better[self.choice.rows[0]]
-        geometries, _ = compensated(better, neutral)
-        before, _ = compensated(self.points[rows], neutral)
+        geometries, _ = align_to_neutral(better, neutral)
+        before, _ = align_to_neutral(self.points[rows], neutral)
         others = np.setdiff1d(np.arange(len(better)), rows)
         geometries[others] += (geometries[rows] - before).mean(axis=0)
         return replace(self, points=better, geometries=geometries)
@@ -109,10 +109,10 @@ def plan_examples(
     series: FaceSeries,
     points: Float[Array, "N n 2"],
     *,
-    wishes: Wishes | None = None,
+    wishes: SelectionOverrides | None = None,
     unfit: Sequence[str] = (),
     count: int = COUNT,
-    different: float = DIFFERENT,
+    different: float = MIN_DIFFERENCE,
 ) -> ExamplePlan:
     """The face at rest, the one with the mouth most open, and those that differ most.
 
@@ -125,9 +125,9 @@ def plan_examples(
     Raises:
         InputError: as choose_examples.
     """
-    wishes = wishes or Wishes()
+    wishes = wishes or SelectionOverrides()
     neutral = _at_rest(series, unfit, wishes)
-    geometries, _ = compensated(points, points[neutral])
+    geometries, _ = align_to_neutral(points, points[neutral])
     candidates = ExampleCandidates(
         geometries, series.scores.sharpness, series.scores.pose, series.names, tuple(unfit)
     )
@@ -166,7 +166,7 @@ def build_examples(
         for name, row in zip(names, rows, strict=True)
     )
     if even:
-        examples = evened(plan.layout, examples)
+        examples = equalize_exposure(plan.layout, examples)
     standard = examples[plan.standard]
     height, width = standard.photo.shape[:2]
     gaps = lip_gaps(plan.layout, plan.geometries[rows]) / _width(examples[0].points)
@@ -176,7 +176,7 @@ def build_examples(
         plan.standard,
         plan.statistics,
         default_subregions(plan.layout, standard.points, (width, height)),
-        tuple(np.flatnonzero(gaps >= TEETH_SHOW).tolist()),
+        tuple(np.flatnonzero(gaps >= TEETH_GAP).tolist()),
     )
     return built, {name: plan.choice.reasons[row] for name, row in zip(names, rows, strict=True)}
 
@@ -187,7 +187,7 @@ def lip_gaps(layout: FeatureLayout, points: Float[Array, "N n 2"]) -> Float[Arra
     return np.linalg.norm(points[:, lower] - points[:, upper], axis=1)
 
 
-def _at_rest(series: FaceSeries, unfit: Sequence[str], wishes: Wishes) -> int:
+def _at_rest(series: FaceSeries, unfit: Sequence[str], wishes: SelectionOverrides) -> int:
     """The row of the face at rest: in a folder of that name, if there is one."""
     if wishes.neutral is not None:
         return wishes.neutral
@@ -203,7 +203,7 @@ def _only(scores: FrameScores, rows: Int[Array, " m"]) -> FrameScores:
 
 
 def _standard(
-    layout: FeatureLayout, candidates: ExampleCandidates, neutral: int, wishes: Wishes
+    layout: FeatureLayout, candidates: ExampleCandidates, neutral: int, wishes: SelectionOverrides
 ) -> tuple[int, str]:
     """The row of the standard image and why it is that."""
     if wishes.standard is not None:

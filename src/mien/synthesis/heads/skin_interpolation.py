@@ -8,18 +8,20 @@ from mien.arrays import Array, Bool, Float
 from mien.assets.generic import load_generic_head
 from mien.rig.followers import Followers, part_vertices
 
-__all__ = ["inside_of_face", "spread_over_skin"]
+__all__ = ["behind_lips_and_lids", "harmonic_extension"]
 
 _NEIGHBOURS, _LEAST_MM = 6, 0.3
 
 
-def inside_of_face() -> Bool[Array, " v"]:
+def behind_lips_and_lids() -> Bool[Array, " v"]:
     """(V,) what lies behind the lips and the lids."""
     regions = load_generic_head().regions
     return np.maximum(regions["mouth_cavity"], regions["eye_socket"]) >= 0.5
 
 
-def spread_over_skin(values: Float[Array, "v k"], known: Bool[Array, " v"]) -> Float[Array, "v k"]:
+def harmonic_extension(
+    values: Float[Array, "v k"], known: Bool[Array, " v"]
+) -> Float[Array, "v k"]:
     """Where nothing is known, skin is the mean of its neighbours; lashes and hair follow the skin.
 
     Eye sockets have what the skin before them has: what they share with the lids alone would take
@@ -59,7 +61,7 @@ def _set_sockets(values: Float[Array, "v k"]) -> None:
     generic = load_generic_head()
     places, skin = generic.mesh.vertices, part_vertices(generic, "skin")
     sockets = skin[generic.regions["eye_socket"][skin] >= 0.5]
-    before = skin[~inside_of_face()[skin]]
+    before = skin[~behind_lips_and_lids()[skin]]
     distance, nearest = cKDTree(places[before]).query(places[sockets], k=_NEIGHBOURS)
     weights = 1 / np.maximum(distance, _LEAST_MM) ** 2
     weights /= weights.sum(axis=1, keepdims=True)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mien.assets.feature_points import load_feature_layout
-from mien.synthesis.examples.brows import detected_points, on_brows
+from mien.synthesis.examples.brow_correction import correct_brows, detected_points
 
 WIDTH = 300
 SKIN, HAIR = (200, 160, 140), (70, 50, 40)
@@ -55,14 +55,14 @@ def raised(layout, points, side, inner, outer):
 
 
 def test_brows_that_are_where_they_should_be_stay(layout, points):
-    found = on_brows(layout, painted(layout, points), points)
+    found = correct_brows(layout, painted(layout, points), points)
     assert np.abs(found - points).max() < 0.005 * WIDTH
 
 
 @pytest.mark.parametrize(("inner", "outer"), [(0.08, 0.08), (0.07, 0.04), (0.03, 0.07)])
 def test_a_raised_brow_is_found_and_the_rest_of_the_face_stays(layout, points, inner, outer):
     true = raised(layout, points, "left", inner, outer)
-    found = on_brows(layout, painted(layout, true), points)
+    found = correct_brows(layout, painted(layout, true), points)
     off = np.linalg.norm(found - true, axis=1) / WIDTH
     assert off[rows_of(layout, "left")].max() < 0.015
     others = np.setdiff1d(np.arange(len(points)), rows_of(layout, "left"))
@@ -78,7 +78,7 @@ def test_a_brow_does_not_overtake_the_forehead(layout, points):
     before = folded(layout, points)
     true = raised(layout, points, "left", 0.08, 0.08)
     assert folded(layout, true) > before
-    found = on_brows(layout, painted(layout, true), points)
+    found = correct_brows(layout, painted(layout, true), points)
     assert folded(layout, found) == before
     half = layout.index("forehead")
     lift = (points - found)[:, 1]
@@ -105,7 +105,7 @@ def test_a_head_on_its_side(layout, points):
     def turned(places):
         return np.column_stack([places[:, 1], 420 - places[:, 0]])
 
-    found = on_brows(layout, picture, turned(points))
+    found = correct_brows(layout, picture, turned(points))
     off = np.linalg.norm(found - turned(true), axis=1)
     assert off[rows_of(layout, "right")].max() < 0.015 * WIDTH
 
@@ -113,9 +113,9 @@ def test_a_head_on_its_side(layout, points):
 def test_a_face_without_brows_stays(layout, points, rng):
     picture = np.full((520, 420, 3), SKIN, np.uint8)
     noise = rng.normal(scale=4, size=picture.shape)
-    np.testing.assert_array_equal(on_brows(layout, picture, points), points)
+    np.testing.assert_array_equal(correct_brows(layout, picture, points), points)
     noisy = (picture + noise).clip(0, 255).astype(np.uint8)
-    np.testing.assert_array_equal(on_brows(layout, noisy, points), points)
+    np.testing.assert_array_equal(correct_brows(layout, noisy, points), points)
 
 
 def test_a_fringe_is_no_brow(layout, points):
@@ -123,14 +123,14 @@ def test_a_fringe_is_no_brow(layout, points):
     picture = painted(layout, points)
     top = points[rows_of(layout, "left")][:, 1].min()
     picture[: round(top - 0.03 * WIDTH)] = HAIR
-    assert np.abs(on_brows(layout, picture, points) - points).max() < 0.005 * WIDTH
+    assert np.abs(correct_brows(layout, picture, points) - points).max() < 0.005 * WIDTH
 
 
 def test_points_do_not_jump(layout, points):
     """A brow that rises in steps of a hundredth of the face's width."""
     steps = np.linspace(0, 0.08, 9)
     found = [
-        on_brows(layout, painted(layout, raised(layout, points, "left", up, up)), points)
+        correct_brows(layout, painted(layout, raised(layout, points, "left", up, up)), points)
         for up in steps
     ]
     heights = -np.array([f[rows_of(layout, "left"), 1].mean() for f in found]) / WIDTH
@@ -149,4 +149,4 @@ def test_landmarks_and_outside(layout, points):
 
 def test_points_in_one_place_stay(layout, points):
     same = np.full_like(points, 7.0)
-    np.testing.assert_array_equal(on_brows(layout, painted(layout, points), same), same)
+    np.testing.assert_array_equal(correct_brows(layout, painted(layout, points), same), same)

@@ -6,7 +6,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8
 
-__all__ = ["with_surroundings"]
+__all__ = ["pad_with_blurred_border"]
 
 _MARGIN = 0.25
 """Of the photo's longer side. From there on colours are repeated, and hardly differ."""
@@ -14,7 +14,7 @@ _SOFTNESS = 0.5
 """Deviation of the blur, in distances from the edge."""
 
 
-def with_surroundings(photo: UInt8[Array, "h w 3"]) -> tuple[UInt8[Array, "k l 3"], int]:
+def pad_with_blurred_border(photo: UInt8[Array, "h w 3"]) -> tuple[UInt8[Array, "k l 3"], int]:
     """A photo, and around it its edge, which is repeated and gets the softer the farther it is.
 
     Pixels of the edge that are merely repeated are stripes: under shoulders, over a hairdo. Here

@@ -10,7 +10,7 @@ from marbled import GENERIC
 from mien.assets.feature_points import load_feature_layout
 from mien.rig.followers import part_vertices
 from mien.rig.gaze import with_turned_eyes
-from mien.synthesis.heads.points import feature_points_on, skin_with_points
+from mien.synthesis.heads.feature_points import feature_points_on, thin_plate_weights
 from people import person
 
 LAYOUT = load_feature_layout()
@@ -55,12 +55,14 @@ def test_pupils_turn_with_the_eyes():
 def test_skin_goes_where_its_points_go(rng):
     asked = rng.normal(size=POINTS.shape)
     asked[PUPILS | INSIDE] = 0
-    found = feature_points_on(person(4) + skin_with_points() @ asked) - feature_points_on(person(4))
+    found = feature_points_on(person(4) + thin_plate_weights() @ asked) - feature_points_on(
+        person(4)
+    )
     np.testing.assert_allclose(found[~(PUPILS | INSIDE)], asked[~(PUPILS | INSIDE)], atol=0.1)
 
 
 def test_a_movement_of_all_points_is_one_of_the_face():
-    along = skin_with_points().sum(axis=1)
+    along = thin_plate_weights().sum(axis=1)
     face = part_vertices(GENERIC, "skin")
     inside = GENERIC.regions["mouth_cavity"] + GENERIC.regions["eye_socket"]
     near = cKDTree(POINTS).query(GENERIC.mesh.vertices)[0] < 8
@@ -72,4 +74,4 @@ def test_a_movement_of_all_points_is_one_of_the_face():
 
 @pytest.mark.parametrize("part", ["left_eyeball", "upper_teeth", "tongue"])
 def test_what_is_not_skin_stays(part):
-    assert not skin_with_points()[part_vertices(GENERIC, part)].any()
+    assert not thin_plate_weights()[part_vertices(GENERIC, part)].any()
