@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,14 @@ import pytest
 from terminal import Built
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals are others there")
+
+
+@pytest.fixture(autouse=True)
+def heard() -> Iterator[None]:
+    """A suite in the background ignores Ctrl-C, and so would the runs that it starts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def started(*arguments: object) -> subprocess.Popen[str]:
