@@ -71,7 +71,7 @@ def test_a_raised_brow_is_found_and_the_rest_of_the_face_stays(layout, points, i
 
 
 def test_a_brow_does_not_overtake_the_forehead(layout, points):
-    """One as high as the forehead's points pushes them up; folded triangles would tear the picture."""
+    """One as high as the forehead's points pushes them up; what folds is torn."""
     points = points.copy()
     skin = [i for i, name in enumerate(layout.names) if "forehead" in name]
     points[skin, 1] += 0.05 * WIDTH

@@ -26,7 +26,7 @@ def photo():
 
 @pytest.fixture(scope="module")
 def detections(photo):
-    """Landmarks of a single detection, and averaged points, of the photo and of its mirror image."""
+    """Landmarks of one detection, and averaged points, of the photo and of its mirror image."""
     mirrored = np.ascontiguousarray(photo[:, ::-1])
     with LandmarkDetector() as detector:
         landmarks = [detector.detect_fast(image).points[:, :2] for image in (photo, mirrored)]
