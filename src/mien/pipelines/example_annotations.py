@@ -15,7 +15,7 @@ from mien.capture.annotations import AnnotationNames, load_annotations
 from mien.capture.folder import ANNOTATIONS
 from mien.capture.images.photos import Photo
 from mien.errors import OtherPointsError
-from mien.io.landmarks.points_file import read_points
+from mien.io.landmarks.points_file import load_feature_points
 from mien.reading.strict_json import read_json
 
 __all__ = [
@@ -56,7 +56,7 @@ def read_annotated_points(
     found: dict[str, Array] = {}
     for path in (path for path in sources if path not in for_heads):
         with suppress(OtherPointsError):
-            rows, places = read_points(path, layout)
+            rows, places = load_feature_points(path, layout)
             found |= {layout.names[r]: at * photo.scale for r, at in zip(rows, places, strict=True)}
     for path in for_heads:
         names = AnnotationNames.of(load_generic_head())
@@ -75,7 +75,7 @@ def annotation_notes(file: Path, layout: FeatureLayout) -> list[str]:
     for path in annotation_files(file):
         try:
             if not _is_for_heads(path):
-                read_points(path, layout)
+                load_feature_points(path, layout)
         except OtherPointsError as error:
             notes.append(f"{path.name} is not used: {error.problem}")
     return notes

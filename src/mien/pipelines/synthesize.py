@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mien.io.examples.example_folder import load_examples
-from mien.io.examples.weights_json import write_weights
+from mien.io.examples.weights_json import save_weights
 from mien.io.files.image import save_image
-from mien.io.landmarks.points_file import check_points_kind, write_points
+from mien.io.landmarks.points_file import check_points_kind, save_feature_points
 from mien.pipelines.synthesize_target import (
     HeadChoice,
     Target,
@@ -98,9 +98,9 @@ def synthesize_expression(
     save_image(output, made.synthesis.image)
     if weights is not None:
         shares, hull_px = made.synthesis.coefficients, made.synthesis.hull_px
-        write_weights(weights, synthesizer.examples, shares, hull_px)
+        save_weights(weights, synthesizer.examples, shares, hull_px)
     if save_points is not None:
-        write_points(save_points, synthesizer.examples.layout, made.synthesis.points)
+        save_feature_points(save_points, synthesizer.examples.layout, made.synthesis.points)
     tell(DRAWING, 1, 1)
     return made
 

@@ -11,10 +11,10 @@ from mien.arrays import Array, Float, Int
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import InputError
 from mien.head import Head
-from mien.io.examples.weights_json import write_shares
+from mien.io.examples.weights_json import save_shares
 from mien.io.files.image import save_image
 from mien.io.head.head_folder import load_head
-from mien.io.landmarks.points_json import read_points_json
+from mien.io.landmarks.points_json import load_points_json
 from mien.pipelines.synthesize_target import check_request
 from mien.progress import Progress, no_progress
 from mien.render.picture import HeadRenderer
@@ -94,7 +94,7 @@ def synthesize_head(
     Raises:
         InputError: neither or both of points and photo, a place that cannot be written, points that
             cannot be meant.
-        FileFormatError: as `load_head`, `read_points_json`.
+        FileFormatError: as `load_head`, `load_points_json`.
         EstimationError: no face in the photo that this head fits.
     """
     tell = progress or no_progress
@@ -166,7 +166,7 @@ def _read_points(
     suffix = Path(path).suffix
     if suffix.lower() != ".json":
         raise InputError(path, "a .json of points in space", suffix or "no suffix")
-    named = read_points_json(path, layout, axes=3)
+    named = load_points_json(path, layout, axes=3)
     return np.array([layout.index(name) for name in named]), np.array(list(named.values()))
 
 
@@ -192,7 +192,7 @@ def _write_weights(
 ) -> None:
     names = synthesizer.rig.names
     photos = [", ".join(view.photo for view in head.expressions[name].views) for name in names]
-    write_shares(
+    save_shares(
         path,
         layout=synthesizer.layout.name,
         sources=dict(zip(names, photos, strict=True)),
