@@ -5,11 +5,10 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from mien.pipelines.example_annotations import (
     apply_annotations,
     read_annotated_points,
 )
+from mien.progress import Progress, StepProgress, no_progress
 from mien.reading.names import plain_name
 from mien.report.example_sheet import example_sheet
 from mien.synthesis.examples.brow_correction import detected_points
@@ -50,9 +50,6 @@ from mien.synthesis.examples.landmark_averaging import averaged_points
 from mien.synthesis.examples.mouth_occlusion import LipContrast
 from mien.synthesis.examples.quality_filter import CUT, OCCLUDED, rejection_reasons
 from mien.synthesis.examples.selection import COUNT
-
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
 
 FINDING, FETCHING = "Finding the face", "Fetching the examples"
 LOOKING, WRITING = "Looking at them again", "Writing"
@@ -133,7 +130,7 @@ def write_example_folder(
         FileFormatError: as InputError.
         EstimationError: as InputError.
     """
-    tell = progress or (lambda stage, done, total: None)
+    tell = progress or no_progress
     kind_of_source(source)
     check_example_place(folder, read=[source])
     gathered = gather_examples(source, request=request, progress=tell)
@@ -166,7 +163,7 @@ def gather_examples(
         EstimationError: no picture shows a face.
     """
     request, layout = request or ExampleRequest(), layout or load_feature_layout()
-    tell = progress or (lambda stage, done, total: None)
+    tell = progress or no_progress
     looked = _Looked(layout)
     with LandmarkDetector() as detector:
         series = find_faces(
@@ -205,7 +202,7 @@ def _steady(
     layout: FeatureLayout,
     photos: Mapping[int, Photo],
     marks: Mapping[int, Marks],
-    report: Callable[[int, int], None],
+    report: StepProgress,
 ) -> dict[int, Float[Array, "n 2"]]:
     """The examples' points from several looks at each, by row; marks win."""
     found = {}

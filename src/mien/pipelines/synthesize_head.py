@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,12 +16,10 @@ from mien.io.files.image import save_image
 from mien.io.head.head_folder import load_head
 from mien.io.landmarks.points_json import read_points_json
 from mien.pipelines.synthesize_target import check_request
+from mien.progress import Progress, no_progress
 from mien.render.picture import HeadRenderer
 from mien.synthesis.heads.synthesizer import HeadSynthesis, HeadSynthesizer
 from mien.synthesis.synthesizer import SynthesisOptions
-
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
 
 __all__ = ["HULL_TOLERANCE_MM", "HeadView", "SynthesizedHeadPicture", "synthesize_head"]
 
@@ -100,7 +97,7 @@ def synthesize_head(
         FileFormatError: as `load_head`, `read_points_json`.
         EstimationError: no face in the photo that this head fits.
     """
-    tell = progress or (lambda stage, done, total: None)
+    tell = progress or no_progress
     check_request(folder, points, photo, output, weights)
     tell(READING, 0, 0)
     head = load_head(folder)
