@@ -36,8 +36,8 @@ class HeadView:
     """From where a head is seen.
 
     Attributes:
-        yaw: radians, as docs/conventions.md says.
-        pitch: radians, as docs/conventions.md says.
+        yaw: radians, as docs/reference/conventions.md says.
+        pitch: radians, as docs/reference/conventions.md says.
         size: width and height, px.
         background: sRGB; transparent unless given. Of a photo's head it is the photo.
     """

@@ -73,7 +73,8 @@ def fit_views(
         EstimationError: no photo fits.
 
     Source:
-        [Pighin 2002] sec. 5.1; the registration of several photos is ours (docs/registration.md).
+        [Pighin 2002] sec. 5.1; the registration of several photos is ours
+        (docs/method/registration.md).
     """
     from threadpoolctl import threadpool_limits
 

@@ -118,7 +118,7 @@ def _residual(mark: Mark) -> dict[str, Any]:
 
 
 def head_angles(camera: Camera) -> tuple[float, float, float]:
-    """Degrees of yaw, pitch and roll of the head before the camera (docs/conventions.md).
+    """Degrees of yaw, pitch and roll of the head before the camera (docs/reference/conventions.md).
 
     The same three angles given to `mien render` show the head turned like that.
     """
