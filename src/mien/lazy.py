@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-from importlib import import_module
-from typing import Any
+# As typing's own, which is not imported: `import mien` takes a tenth of the time without it.
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
 
 
 def public_names(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
@@ -13,8 +14,8 @@ def public_names(package: str, file: str) -> tuple[Callable[[str], Any], Callabl
 
     The names are listed once, as imports in the stub `__init__.pyi` beside the package's
     `__init__.py`. Type checkers, editors and documentation tools read that file; so does the
-    package itself, when it is first asked for a name. (lazy_loader's attach_stub does the same
-    when the package is imported, but takes only names from inside the package.)
+    package itself, when it is first asked for a name. (lazy_loader's attach_stub reads it when the
+    package is imported, and takes only names from inside the package.)
 
     Args:
         package: its `__name__`.
@@ -24,24 +25,28 @@ def public_names(package: str, file: str) -> tuple[Callable[[str], Any], Callabl
         The package's `__getattr__`, which also knows `__all__`, and its `__dir__`, which lists the
         public names alone.
     """
+    modules: dict[str, str] = {}
 
-    @cache
-    def homes() -> dict[str, str]:
-        return _imports_of(f"{file.removesuffix('.py')}.pyi")
+    def module_of() -> dict[str, str]:
+        if not modules:
+            modules.update(_imports_of(f"{file.removesuffix('.py')}.pyi"))
+        return modules
 
     def get(name: str) -> Any:
+        from importlib import import_module
+
         if name == "__all__":
-            return sorted(homes())
+            return names()
         # What Python itself asks of any package, such as `__path__`, is no public name.
-        home = None if name.startswith("__") else homes().get(name)
-        if home is None:
+        module = None if name.startswith("__") else module_of().get(name)
+        if module is None:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        if home == package:
+        if module == package:
             return import_module(f"{package}.{name}")
-        return getattr(import_module(home), name)
+        return getattr(import_module(module), name)
 
     def names() -> list[str]:
-        return sorted(homes())
+        return sorted(module_of())
 
     return get, names
 
