@@ -1,4 +1,4 @@
-"""Hand marks on photos that become examples: they win, and their neighbours follow."""
+"""Annotated points on photos that become examples replace detected ones; neighbours follow."""
 
 from __future__ import annotations
 
@@ -45,44 +45,44 @@ def annotate(photo: Photo, **data: object) -> None:
     (folder / "anna.json").write_text(json.dumps(data))
 
 
-def test_no_marks(layout: FeatureLayout, points: Array, photo: Photo) -> None:
+def test_no_annotations(layout: FeatureLayout, points: Array, photo: Photo) -> None:
     assert read_annotated_points(photo.path, photo, layout) == {}
     assert apply_annotations(layout, points, {}) is points
 
 
 def test_all_points_from_a_delineation(layout: FeatureLayout, points: Array, photo: Photo) -> None:
     write_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
-    marks = read_annotated_points(photo.path, photo, layout)
-    found = apply_annotations(layout, 100 + 0 * points + layout.template, marks)
+    annotated = read_annotated_points(photo.path, photo, layout)
+    found = apply_annotations(layout, 100 + 0 * points + layout.template, annotated)
     np.testing.assert_allclose(found, points / 2, atol=1e-3)
 
 
 def test_some_points_from_ibug(layout: FeatureLayout, points: Array, photo: Photo) -> None:
     write_pts(photo.path.with_suffix(".pts"), points_to_ibug(layout, points))
-    marks = read_annotated_points(photo.path, photo, layout)
-    assert 30 <= len(marks) <= 40
-    for name, place in marks.items():
+    annotated = read_annotated_points(photo.path, photo, layout)
+    assert 30 <= len(annotated) <= 40
+    for name, place in annotated.items():
         np.testing.assert_allclose(place, points[layout.index(name)] / 2, atol=1e-3)
 
 
 def test_points_of_the_layout_in_json(layout: FeatureLayout, photo: Photo) -> None:
     annotate(photo, layout=layout.name, points={"chin": [200, 500], "right_jaw.0": [150, 480]})
-    marks = read_annotated_points(photo.path, photo, layout)
-    np.testing.assert_array_equal(marks["chin"], [100, 250])
-    np.testing.assert_array_equal(marks["right_jaw.0"], [75, 240])
+    annotated = read_annotated_points(photo.path, photo, layout)
+    np.testing.assert_array_equal(annotated["chin"], [100, 250])
+    np.testing.assert_array_equal(annotated["right_jaw.0"], [75, 240])
 
 
-def test_marks_made_for_a_head_count_where_they_mean_the_same(
+def test_annotations_for_heads_count_where_they_are_the_same_points(
     layout: FeatureLayout, photo: Photo
 ) -> None:
     """`left_jaw.3` is another place on the head than among the feature points."""
     annotate(photo, points={"nose_tip": [200, 300], "left_jaw.3": [250, 480], "chin": [200, 500]})
-    marks = read_annotated_points(photo.path, photo, layout)
-    assert list(marks) == ["nose_tip"]
-    np.testing.assert_array_equal(marks["nose_tip"], [100, 150])
+    annotated = read_annotated_points(photo.path, photo, layout)
+    assert list(annotated) == ["nose_tip"]
+    np.testing.assert_array_equal(annotated["nose_tip"], [100, 150])
 
 
-def test_json_counts_more_than_a_delineation(
+def test_json_takes_precedence_over_a_delineation(
     layout: FeatureLayout, points: Array, photo: Photo
 ) -> None:
     write_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
@@ -100,7 +100,7 @@ def test_json_counts_more_than_a_delineation(
         ({"points": {"chinn": [1, 2]}}, "points.chinn: unknown name; did you mean chin"),
     ],
 )
-def test_broken_marks(
+def test_broken_annotations(
     layout: FeatureLayout, photo: Photo, data: dict[str, object], message: str
 ) -> None:
     annotate(photo, **data)
@@ -131,7 +131,7 @@ def test_a_damaged_delineation_is_no_other_kind(layout: FeatureLayout, photo: Ph
             read()
 
 
-def test_neighbours_follow_and_the_far_stay(layout: FeatureLayout, points: Array) -> None:
+def test_neighbours_follow_and_far_points_stay(layout: FeatureLayout, points: Array) -> None:
     corner = layout.index("right_mouth_corner")
     moved = np.array([6.0, -4.0])
     found = apply_annotations(layout, points, {"right_mouth_corner": points[corner] + moved})
@@ -143,8 +143,8 @@ def test_neighbours_follow_and_the_far_stay(layout: FeatureLayout, points: Array
     assert steps.min() >= 0
 
 
-def test_marks_that_agree_move_all_between_them_alike(layout: FeatureLayout, points: Array) -> None:
+def test_annotations_that_agree_move_all_points_alike(layout: FeatureLayout, points: Array) -> None:
     names = [name for name in layout.names if name != "chin"]
-    marks = {name: points[layout.index(name)] + [3, 1] for name in names}
-    found = apply_annotations(layout, points, marks)
+    annotated = {name: points[layout.index(name)] + [3, 1] for name in names}
+    found = apply_annotations(layout, points, annotated)
     np.testing.assert_allclose(found - points, np.tile([3, 1], (len(points), 1)), atol=0.2)
