@@ -231,8 +231,8 @@ INTRO = (
 SURFACE = (
     "Distances over the face, after a similarity. Same point: on scans what lies behind the same "
     "pixel of every photo, through the fitted camera and through the true one; on persons the same "
-    "vertex. Nearest point: as in docs/accuracy.md, after ICP. The generic head, not fitted, is "
-    "measured beside it in the same way."
+    "vertex. Nearest point: as in docs/notes/accuracy.md, after ICP. The generic head, not fitted, "
+    "is measured beside it in the same way."
 )
 CAMERAS = (
     "Turn: of every photo from the first, against the true one. Seconds: of the fit, without "

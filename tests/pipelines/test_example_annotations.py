@@ -17,7 +17,7 @@ from mien.io.landmarks.tem import points_to_tem, write_tem
 from mien.pipelines.example_annotations import (
     annotation_notes,
     apply_annotations,
-    read_annotated_points,
+    load_annotated_points,
 )
 
 
@@ -46,20 +46,20 @@ def annotate(photo: Photo, **data: object) -> None:
 
 
 def test_no_annotations(layout: FeatureLayout, points: Array, photo: Photo) -> None:
-    assert read_annotated_points(photo.path, photo, layout) == {}
+    assert load_annotated_points(photo.path, photo, layout) == {}
     assert apply_annotations(layout, points, {}) is points
 
 
 def test_all_points_from_a_delineation(layout: FeatureLayout, points: Array, photo: Photo) -> None:
     write_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
-    annotated = read_annotated_points(photo.path, photo, layout)
+    annotated = load_annotated_points(photo.path, photo, layout)
     found = apply_annotations(layout, 100 + 0 * points + layout.template, annotated)
     np.testing.assert_allclose(found, points / 2, atol=1e-3)
 
 
 def test_some_points_from_ibug(layout: FeatureLayout, points: Array, photo: Photo) -> None:
     write_pts(photo.path.with_suffix(".pts"), points_to_ibug(layout, points))
-    annotated = read_annotated_points(photo.path, photo, layout)
+    annotated = load_annotated_points(photo.path, photo, layout)
     assert 30 <= len(annotated) <= 40
     for name, place in annotated.items():
         np.testing.assert_allclose(place, points[layout.index(name)] / 2, atol=1e-3)
@@ -67,7 +67,7 @@ def test_some_points_from_ibug(layout: FeatureLayout, points: Array, photo: Phot
 
 def test_points_of_the_layout_in_json(layout: FeatureLayout, photo: Photo) -> None:
     annotate(photo, layout=layout.name, points={"chin": [200, 500], "right_jaw.0": [150, 480]})
-    annotated = read_annotated_points(photo.path, photo, layout)
+    annotated = load_annotated_points(photo.path, photo, layout)
     np.testing.assert_array_equal(annotated["chin"], [100, 250])
     np.testing.assert_array_equal(annotated["right_jaw.0"], [75, 240])
 
@@ -77,7 +77,7 @@ def test_annotations_for_heads_count_where_they_are_the_same_points(
 ) -> None:
     """`left_jaw.3` is another place on the head than among the feature points."""
     annotate(photo, points={"nose_tip": [200, 300], "left_jaw.3": [250, 480], "chin": [200, 500]})
-    annotated = read_annotated_points(photo.path, photo, layout)
+    annotated = load_annotated_points(photo.path, photo, layout)
     assert list(annotated) == ["nose_tip"]
     np.testing.assert_array_equal(annotated["nose_tip"], [100, 150])
 
@@ -87,7 +87,7 @@ def test_json_takes_precedence_over_a_delineation(
 ) -> None:
     write_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
     annotate(photo, layout=layout.name, points={"chin": [10, 20]})
-    np.testing.assert_array_equal(read_annotated_points(photo.path, photo, layout)["chin"], [5, 10])
+    np.testing.assert_array_equal(load_annotated_points(photo.path, photo, layout)["chin"], [5, 10])
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_broken_annotations(
 ) -> None:
     annotate(photo, **data)
     with pytest.raises(FileFormatError, match=message) as caught:
-        read_annotated_points(photo.path, photo, layout)
+        load_annotated_points(photo.path, photo, layout)
     assert "anna.json" in str(caught.value)
 
 
@@ -114,7 +114,7 @@ def test_points_of_other_kinds_are_noted_and_not_used(layout: FeatureLayout, pho
     assert annotation_notes(photo.path, layout) == []
     photo.path.with_suffix(".tem").write_text("2\n1 2\n3 4\n0\n")
     write_pts(photo.path.with_suffix(".pts"), np.zeros((5, 2)))
-    assert list(read_annotated_points(photo.path, photo, layout)) == ["chin"]
+    assert list(load_annotated_points(photo.path, photo, layout)) == ["chin"]
     template, ibug = annotation_notes(photo.path, layout)
     assert template.startswith("anna.tem is not used: expected 134 points (zhang134), 7 (dlib's 5")
     assert template.endswith(", found 2")
@@ -124,7 +124,7 @@ def test_points_of_other_kinds_are_noted_and_not_used(layout: FeatureLayout, pho
 def test_a_damaged_delineation_is_no_other_kind(layout: FeatureLayout, photo: Photo) -> None:
     photo.path.with_suffix(".tem").write_text("2\n1 2\n3 x\n0\n")
     for read in (
-        lambda: read_annotated_points(photo.path, photo, layout),
+        lambda: load_annotated_points(photo.path, photo, layout),
         lambda: annotation_notes(photo.path, layout),
     ):
         with pytest.raises(FileFormatError, match=r"anna\.tem: line 3: expected a finite number"):

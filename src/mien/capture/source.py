@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -25,10 +24,8 @@ from mien.capture.notes import gathered_notes
 from mien.capture.source_kind import kind_of_source
 from mien.capture.video.picked_frames import pick_frames
 from mien.errors import EstimationError
+from mien.progress import StepProgress
 from mien.reading.names import plain_name
-
-Progress = Callable[[int, int], None]
-"""Called with the number of steps done and their total."""
 
 TO_BE_PLACED = "no face found; the other photos tell where it was taken from, if they can"
 """Noted of a photo that shows a profile, perhaps, or nobody."""
@@ -85,7 +82,7 @@ def load_capture(
     frames: int = 7,
     expressions: int | None = None,
     names: AnnotationNames | None = None,
-    progress: Progress | None = None,
+    progress: StepProgress | None = None,
 ) -> Capture:
     """Photos from a folder, expression folders, one photo or a video, with all that is known.
 
@@ -135,7 +132,7 @@ class _Reader:
         max_side: int,
         face: int | None,
         names: AnnotationNames | None,
-        progress: Progress | None,
+        progress: StepProgress | None,
     ) -> None:
         self.detector, self.max_side, self.face = detector, max_side, face
         self.names, self.progress = names, progress

@@ -56,7 +56,7 @@ def examples(
     json_: Json = False,
 ) -> None:
     """Photos or a video to a set of examples that expressions are mixed from."""
-    from mien.pipelines.examples import COUNTED, ExampleRequest, write_example_folder
+    from mien.pipelines.examples import COUNTED, ExampleRequest, save_example_folder
 
     request = ExampleRequest(
         count=count,
@@ -69,7 +69,7 @@ def examples(
         even=even,
     )
     with terminal_progress(json_, counted=COUNTED) as progress:
-        gathered = write_example_folder(source, output, request=request, progress=progress)
+        gathered = save_example_folder(source, output, request=request, progress=progress)
     found = gathered.examples
     names = [example.name for example in found.examples]
     data = {

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,11 +18,9 @@ from mien.io.files.atomic import check_file_place, check_files_apart
 from mien.io.timeline.timeline_check import check_timeline
 from mien.io.timeline.timeline_file import load_performance, performance_files
 from mien.pipelines.explained import units_of
+from mien.progress import Progress, StepProgress, no_progress, stage_progress
 from mien.render.picture import GREY, HeadRenderer
 from mien.rig.state import FaceState
-
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
 
 SIZE = (720, 900)
 """Of pictures, px, unless the timeline or the user says."""
@@ -54,7 +51,7 @@ class _Job:
     yaw: float
     pitch: float
     background: tuple[int, int, int] | None
-    tell: Callable[[int, int], None] = field(repr=False)
+    tell: StepProgress = field(repr=False)
 
     @cached_property
     def times(self) -> Array:
@@ -117,7 +114,7 @@ def animate_head(
     name = timeline if isinstance(timeline, (str, Path)) else "timeline"
     played = timeline if isinstance(timeline, Timeline) else load_performance(timeline)
     check_timeline(played, expressions=head.expressions, units=head.unit_names, path=name)
-    tell = progress or (lambda stage, done, total: None)
+    tell = progress or no_progress
     job = _Job(
         renderer=HeadRenderer(head),
         timeline=played,
@@ -126,7 +123,7 @@ def animate_head(
         yaw=yaw,
         pitch=pitch,
         background=background,
-        tell=lambda done, total: tell(STAGE, done, total),
+        tell=stage_progress(tell, STAGE),
     )
     try:
         _ = job.times

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from mien.head import ATLAS, CYLINDER, NEUTRAL, Expression, FittedView, Head
 from mien.io.files.manifest import kept_notes
 from mien.io.files.video import write_video
 from mien.io.head.head_folder import check_head_place, head_place, write_head
+from mien.progress import Progress, StepProgress, no_progress, stage_progress
 from mien.reconstruction.expression.fit import ExpressionFit, fit_expression
 from mien.reconstruction.expression.known_head import KnownHead
 from mien.reconstruction.fit import Fit, FitOptions, fit_views
@@ -33,9 +34,6 @@ from mien.texture.cylinder import cylinder_surface, fit_cylinder
 from mien.texture.extract import Texture, extract_texture
 from mien.texture.fill import Fill
 from mien.texture.surface import SurfaceMap
-
-Progress = Callable[[str, int, int], None]
-"""Told the stage, the steps done and their total."""
 
 SOLVING = "Solving cameras and shape"
 REPORTING = "Writing the report"
@@ -111,7 +109,7 @@ def build_head(
         EstimationError: no photo fits.
     """
     options = options or BuildOptions()
-    tell = progress or (lambda stage, done, total: None)
+    tell = progress or no_progress
     _check_neutral(Path(source))
     generic = load_generic_head()
     capture = load_capture(
@@ -119,7 +117,7 @@ def build_head(
         face=options.face,
         frames=options.frames,
         expressions=options.expressions,
-        progress=lambda done, total: tell("Finding faces", done, total),
+        progress=stage_progress(tell, "Finding faces"),
     )
     capture = _named_by_expression(capture)
     if NEUTRAL not in capture.expressions:
@@ -147,7 +145,7 @@ def _fit_all(
     """
     count = len(capture.expressions)
 
-    def part(number: int) -> Callable[[int, int], None]:
+    def part(number: int) -> StepProgress:
         return lambda done, total: tell(SOLVING, number * total + done, count * total)
 
     tell(SOLVING, 0, count)
@@ -303,7 +301,7 @@ def build_head_folder(
         as build_head; InputError: the place holds something that is no head folder, or cannot be
             written. Whatever was there stays until the new folder is whole.
     """
-    tell = progress or (lambda stage, done, total: None)
+    tell = progress or no_progress
     check_head_place(folder, read=[source])
     result = build_head(source, options=options, progress=progress)
     stage = "Writing the head"
@@ -322,6 +320,6 @@ def build_head_folder(
         report = ReportInput(
             result.head, photos, result.fits, result.coverage, result.notes, TURNTABLE
         )
-        page = render_report(report, progress=lambda done, total: tell(REPORTING, done, total))
+        page = render_report(report, progress=stage_progress(tell, REPORTING))
         (place / "report.html").write_text(page, encoding="utf-8")
     return replace(result, kept=kept_notes(Path(folder)))

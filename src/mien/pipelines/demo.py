@@ -15,7 +15,8 @@ from mien.io.files.image import save_image
 from mien.io.head.head_folder import is_head_folder
 from mien.io.mesh.export import export_head
 from mien.pipelines.animate import animate_head
-from mien.pipelines.build import TURNTABLE, Progress, build_head_folder
+from mien.pipelines.build import TURNTABLE, build_head_folder
+from mien.progress import Progress
 from mien.render.picture import GREY, HeadRenderer, render_head
 from mien.rig.state import FaceState
 

@@ -23,7 +23,7 @@ __all__ = [
     "annotation_notes",
     "apply_all_annotations",
     "apply_annotations",
-    "read_annotated_points",
+    "load_annotated_points",
 ]
 
 HEAD_POINTS = tuple(
@@ -40,7 +40,7 @@ AnnotatedPoints = Mapping[str, Float[Array, " 2"]]
 """px, by name."""
 
 
-def read_annotated_points(
+def load_annotated_points(
     file: Path, photo: Photo, layout: FeatureLayout
 ) -> dict[str, Float[Array, " 2"]]:
     """Hand-annotated points beside a photo, by name, in px of the photo as loaded.

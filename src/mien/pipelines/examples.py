@@ -5,11 +5,10 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,8 +33,9 @@ from mien.pipelines.example_annotations import (
     annotation_notes,
     apply_all_annotations,
     apply_annotations,
-    read_annotated_points,
+    load_annotated_points,
 )
+from mien.progress import Progress, StepProgress, no_progress
 from mien.reading.names import plain_name
 from mien.report.example_sheet import example_sheet
 from mien.synthesis.examples.brow_correction import detected_points
@@ -50,9 +50,6 @@ from mien.synthesis.examples.landmark_averaging import averaged_points
 from mien.synthesis.examples.mouth_occlusion import LipContrast
 from mien.synthesis.examples.quality_filter import CUT, OCCLUDED, rejection_reasons
 from mien.synthesis.examples.selection import COUNT
-
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
 
 FINDING, FETCHING = "Finding the face", "Fetching the examples"
 DETECTING_AGAIN, WRITING = "Looking at them again", "Writing"
@@ -122,7 +119,7 @@ class GatheredExamples:
     notes: tuple[str, ...]
 
 
-def write_example_folder(
+def save_example_folder(
     source: str | Path,
     folder: str | Path,
     *,
@@ -143,7 +140,7 @@ def write_example_folder(
         FileFormatError: as InputError.
         EstimationError: as InputError.
     """
-    report = progress or (lambda stage, done, total: None)
+    report = progress or no_progress
     kind = kind_of_source(source)
     check_example_place(folder, read=[source])
     gathered = _gather(source, kind, request, None, report)
@@ -177,7 +174,7 @@ def gather_examples(
         FileFormatError: a damaged photo, video or file of annotations.
         EstimationError: no picture shows a face.
     """
-    report = progress or (lambda stage, done, total: None)
+    report = progress or no_progress
     return _gather(source, kind_of_source(source), request, layout, report)
 
 
@@ -241,7 +238,7 @@ def _annotated_points(series: FaceSeries, layout: FeatureLayout) -> dict[int, An
     for row, file in enumerate(series.files):
         if annotation_files(file):
             photo = load_photo(file, max_side=series.max_side)
-            annotated[row] = read_annotated_points(file, photo, layout)
+            annotated[row] = load_annotated_points(file, photo, layout)
     return {row: points for row, points in annotated.items() if points}
 
 
@@ -250,7 +247,7 @@ def _averaged(
     layout: FeatureLayout,
     photos: Mapping[int, Photo],
     annotated: Mapping[int, AnnotatedPoints],
-    report: Callable[[int, int], None],
+    report: StepProgress,
 ) -> dict[int, Float[Array, "n 2"]]:
     """The examples' points averaged over several detections, by row; annotated ones stay."""
     averaged = {}

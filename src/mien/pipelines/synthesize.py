@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mien.io.examples.example_folder import load_examples
 from mien.io.examples.weights_json import write_weights
@@ -17,12 +16,10 @@ from mien.pipelines.synthesize_target import (
     target_from_photo,
     target_from_points,
 )
+from mien.progress import Progress, no_progress
 from mien.synthesis.examples.example_set import ExampleSet
 from mien.synthesis.inference.input_checks import face_width
 from mien.synthesis.synthesizer import Synthesis, SynthesisOptions, Synthesizer
-
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
 
 __all__ = ["HULL_TOLERANCE", "SynthesizedPicture", "hull_note", "synthesize_expression"]
 
@@ -86,7 +83,7 @@ def synthesize_expression(
         FileFormatError: as `load_examples`, `target_from_points`, `target_from_photo`.
         EstimationError: as `load_examples`, `target_from_points`, `target_from_photo`.
     """
-    report = progress or (lambda stage, done, total: None)
+    report = progress or no_progress
     check_request(folder, points, photo, output, weights, save_points)
     if save_points is not None:
         check_points_kind(save_points)

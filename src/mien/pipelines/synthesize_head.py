@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,12 +18,10 @@ from mien.io.head.head_folder import load_head
 from mien.io.landmarks.points_json import read_points_json
 from mien.pipelines.head_in_photo import find_head
 from mien.pipelines.synthesize_target import check_request
+from mien.progress import Progress, no_progress
 from mien.render.picture import HeadRenderer
 from mien.synthesis.heads.synthesizer import HeadSynthesis, HeadSynthesizer
 from mien.synthesis.synthesizer import SynthesisOptions
-
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
 
 __all__ = ["HULL_TOLERANCE_MM", "HeadView", "SynthesizedHeadPicture", "synthesize_head"]
 
@@ -41,8 +38,8 @@ class HeadView:
     """The view of a head.
 
     Attributes:
-        yaw: radians, as docs/conventions.md says.
-        pitch: radians, as docs/conventions.md says.
+        yaw: radians, as docs/reference/conventions.md says.
+        pitch: radians, as docs/reference/conventions.md says.
         size: width and height, px.
         background: sRGB; transparent unless given.
     """
@@ -102,7 +99,7 @@ def synthesize_head(
         FileFormatError: as `load_head`, `read_points_json`.
         EstimationError: no face in the photo that this head fits.
     """
-    report = progress or (lambda stage, done, total: None)
+    report = progress or no_progress
     check_request(folder, points, photo, output, weights)
     report(READING, 0, 0)
     head = load_head(folder)

@@ -21,7 +21,7 @@ from mien.pipelines.example_annotations import (
     annotation_files,
     annotation_notes,
     apply_annotations,
-    read_annotated_points,
+    load_annotated_points,
 )
 from mien.synthesis.examples.landmark_averaging import averaged_points
 from mien.synthesis.inference.input_checks import (
@@ -158,7 +158,7 @@ def target_from_photo(
         landmarks = detector.detect(photo, face=face)
         # In the same way as the points of the examples: see there.
         detected = averaged_points(layout, detector, photo.pixels, landmarks.points)
-    points = apply_annotations(layout, detected, read_annotated_points(Path(path), photo, layout))
+    points = apply_annotations(layout, detected, load_annotated_points(Path(path), photo, layout))
     points = _complete_outside(synthesizer, points, photo.size)
     motion = synthesizer.head_motion(points)
     notes = [f"{path}: {note}" for note in (*photo.notes, *landmarks.notes)]

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING
 
 from mien.arrays import check_positive
 from mien.capture.faces.detector import LandmarkDetector
@@ -21,14 +20,12 @@ from mien.pipelines.tracking.notes import check_found, track_notes
 from mien.pipelines.tracking.outputs import OVERLAY, TrackFiles
 from mien.pipelines.tracking.ready_head import ReadyHead
 from mien.pipelines.tracking.run import TRACKING, TrackRun
+from mien.progress import Progress, no_progress
 from mien.reading.names import named_path
 from mien.track.lens import parse_lens
 from mien.track.smoothing import smooth
 from mien.track.state import STATUSES, Status, Track
 from mien.track.tracker import TrackOptions
-
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
 
 MAX_SIDE = 1920
 """px; larger pictures are tracked reduced to it. Reducing smaller ones would take longer than it
@@ -103,7 +100,7 @@ def track_video(
         FileFormatError: as InputError.
         EstimationError: when all is written, a video whose frames are all lost.
     """
-    tell = progress or (lambda stage, done, total: None)
+    tell = progress or no_progress
     clip = Video(named_path("video", video, "a video"))
     files.check(clip.path)
     if smooth_seconds is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from mien.camera import Camera
 from mien.capture.faces.detector import NO_FACE
 from mien.capture.source import View
 from mien.errors import EstimationError
+from mien.progress import StepProgress
 from mien.reconstruction.features import gather_features
 from mien.reconstruction.landmark_fit import FitOptions, Solution, residuals_of, solve_by_features
 from mien.reconstruction.outliers import (
@@ -35,8 +36,6 @@ ONE_SIDE_DEG = 10.0
 ONE_SIDE = "it looks from the same side as {}, and would only blur what that one shows"
 NEARER_TELLS = 1.3
 """Unless one is taken from so many times the distance of another: perspective tells it, too."""
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ def fit_views(
     generic: GenericHead,
     options: FitOptions,
     *,
-    progress: Progress | None = None,
+    progress: StepProgress | None = None,
 ) -> Fit:
     """Cameras and shape of one expression.
 
@@ -74,7 +73,8 @@ def fit_views(
         EstimationError: no photo fits.
 
     Source:
-        [Pighin 2002] sec. 5.1; the registration of several photos is ours (docs/registration.md).
+        [Pighin 2002] sec. 5.1; the registration of several photos is ours
+        (docs/method/registration.md).
     """
     from threadpoolctl import threadpool_limits
 
@@ -84,7 +84,7 @@ def fit_views(
 
 
 def _fit_views(
-    views: Sequence[View], generic: GenericHead, options: FitOptions, progress: Progress | None
+    views: Sequence[View], generic: GenericHead, options: FitOptions, progress: StepProgress | None
 ) -> Fit:
     marked = [view for view in views if view.marked]
     faceless = [view for view in views if not view.marked]
@@ -124,7 +124,7 @@ def _all_photos(
     faceless: Sequence[View],
     generic: GenericHead,
     options: FitOptions,
-    progress: Progress | None,
+    progress: StepProgress | None,
 ) -> Solution:
     """The solution by the skin that the photos share; where they look from one side, one's own."""
     if faceless or len(solution.views) == 1 or not _from_one_side(solution.cameras):

@@ -26,7 +26,7 @@ FOCAL_PRIOR_DEVIATION = 0.6
 EXIF_DEVIATION = 0.05
 NAMED_SIGMA_MM = 2.0
 """How far a marked point lies off the identity basis, each axis: what a name means differs between
-faces and between people who mark them (docs/pose-recovery.md)."""
+faces and between people who mark them (docs/method/cameras.md)."""
 ATTACHED_SIGMA_MM = 1.5
 """The same for a landmark: the detector that finds it also attached it to the generic head."""
 NEAREST_MM = 150.0

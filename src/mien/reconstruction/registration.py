@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from mien.camera import Camera
 from mien.capture.source import View
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
+from mien.progress import StepProgress
 from mien.reconstruction.dense.joint import Lenses
 from mien.reconstruction.dense.register import (
     SCALES_MM,
@@ -23,8 +24,6 @@ from mien.reconstruction.dense.register import (
 from mien.reconstruction.features import gather_features
 from mien.reconstruction.landmark_fit import Solution, focal_beliefs, residuals_of, same_lens
 from mien.reconstruction.localization.localizer import place_views
-
-Progress = Callable[[int, int], None]
 
 NOTHING_SHARED = (
     "the photos share too little skin to be registered with each other: cameras and shape rest on "
@@ -48,7 +47,7 @@ def register_solution(
     solution: Solution,
     faceless: Sequence[View],
     generic: GenericHead,
-    progress: Progress | None = None,
+    progress: StepProgress | None = None,
 ) -> Solution:
     """The solution by all the skin that its photos share, with the photos placed by it added.
 
@@ -86,7 +85,7 @@ def _registered(
     solution: Solution,
     generic: GenericHead,
     scales: Sequence[float],
-    progress: Progress | None,
+    progress: StepProgress | None,
 ) -> Solution:
     views, lenses = solution.views, _lenses(solution.views)
     known = (views, solution.cameras, solution.vertices, solution.features, lenses, generic)

@@ -48,7 +48,7 @@ class HeadRenderer:
         *,
         size: tuple[int, int] = (800, 1000),
     ) -> Camera:
-        """The camera that sees the head turned like this (radians, docs/conventions.md).
+        """The camera that sees the head turned like this (radians, docs/reference/conventions.md).
 
         Framed by the neutral head, so that an open mouth does not change the scale.
         """
@@ -92,9 +92,9 @@ def render_head(
 
     Args:
         head: or what HeadRenderer prepared of it, for many pictures of one head.
-        yaw: radians, as docs/conventions.md says.
-        pitch: radians, as docs/conventions.md says.
-        roll: radians, as docs/conventions.md says.
+        yaw: radians, as docs/reference/conventions.md says.
+        pitch: radians, as docs/reference/conventions.md says.
+        roll: radians, as docs/reference/conventions.md says.
         size: width and height in px; with `photo`, the photo's own.
         photo: reproduce the view of this photo instead of turning the head: its camera and, unless
             the state says which expressions to mix, the expression that it belongs to.

@@ -265,8 +265,10 @@ def test_statistics_that_are_no_archive(folder: Path) -> None:
 def test_the_documented_way_to_read_it(
     folder: Path, example_set: ExampleSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """docs/example-folder.md shows how to read the folder with numpy alone; it must be true."""
-    text = (Path(__file__).parents[3] / "docs" / "example-folder.md").read_text("utf-8")
+    """docs/reference/example-folder.md shows how to read the folder with numpy; it must be true."""
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "example-folder.md").read_text(
+        "utf-8"
+    )
     code = text.split("```python\n")[1].split("```")[0]
     folder.rename(folder.with_name("anna"))
     monkeypatch.chdir(folder.parent)
@@ -278,7 +280,9 @@ def test_the_documented_way_to_read_it(
 
 
 def test_the_documented_keys_are_those_written(folder: Path) -> None:
-    text = (Path(__file__).parents[3] / "docs" / "example-folder.md").read_text("utf-8")
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "example-folder.md").read_text(
+        "utf-8"
+    )
     shown = json.loads(text.split("```json\n")[1].split("```")[0])
     written = json.loads((folder / "examples.json").read_text())
     assert list(shown) == list(written)

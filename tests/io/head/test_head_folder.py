@@ -504,8 +504,8 @@ def test_pickled_arrays_are_never_read(saved: Path) -> None:
 
 
 def test_the_documents_own_reader_works(saved: Path, small_head: Head) -> None:
-    """docs/head-folder.md shows how to read the folder with numpy alone; it must be true."""
-    text = (Path(__file__).parents[3] / "docs" / "head-folder.md").read_text("utf-8")
+    """docs/reference/head-folder.md shows how to read the folder with numpy; it must be true."""
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "head-folder.md").read_text("utf-8")
     program = text.split("```python\n")[1].split("```")[0]
     program = program.replace('open("HEAD/head.json", encoding="utf-8")', "opened")
     program = program.replace("HEAD", saved.as_posix())
@@ -520,7 +520,7 @@ def test_the_documents_own_reader_works(saved: Path, small_head: Head) -> None:
 
 
 def test_the_document_shows_every_key(saved: Path) -> None:
-    text = (Path(__file__).parents[3] / "docs" / "head-folder.md").read_text("utf-8")
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "head-folder.md").read_text("utf-8")
     shown = json.loads(text.split("```json\n")[1].split("```")[0])
     written = json.loads((saved / "head.json").read_text("utf-8"))
     assert list(shown) == list(written)

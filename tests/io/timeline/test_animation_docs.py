@@ -1,4 +1,4 @@
-"""docs/animation.md says what the code does."""
+"""docs/reference/timeline.md says what the code does."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from mien.io.timeline.fap_table import PARAMETERS
 from mien.io.timeline.timeline_check import check_timeline
 from mien.io.timeline.timeline_json import DEGREES, load_timeline
 
-PAGE = (Path(__file__).parents[3] / "docs" / "animation.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "reference" / "timeline.md").read_text(
+    encoding="utf-8"
+)
 
 
 def test_the_example_loads(tmp_path: Path) -> None:

@@ -160,6 +160,6 @@ def test_an_empty_track_is_refused(tmp_path: Path, rng: np.random.Generator) -> 
 
 
 def test_the_docs_table_is_the_codes() -> None:
-    page = Path(__file__).parents[3] / "docs" / "track-files.md"
+    page = Path(__file__).parents[3] / "docs" / "reference" / "track-files.md"
     rows = re.findall(r"^\| (AU\d\d) \|.*\| ([\w, ]+?)(?:;.*)? \|$", page.read_text(), re.MULTILINE)
     assert {name: tuple(units.split(", ")) for name, units in rows} == dict(ACTION_UNITS)

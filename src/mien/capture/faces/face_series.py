@@ -24,15 +24,13 @@ from mien.capture.video.frames_ahead import frames_ahead
 from mien.capture.video.orientation import turn_upright
 from mien.capture.video.video import Video
 from mien.errors import EstimationError, InputError
+from mien.progress import StepProgress
 from mien.reading.names import plain_name
 
 __all__ = ["FaceSeries", "Look", "find_faces", "load_pictures", "row_of", "rows_of"]
 
 Look = Callable[[UInt8[Array, "h w 3"], Float[Array, "478 2"]], None]
 """Told of each picture that shows a face, in the series' order, and where its landmarks are."""
-
-Report = Callable[[int, int], None]
-"""Told the number of steps done and their total; 0: not known."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,7 @@ def find_faces(
     kind: SourceKind | None = None,
     face: int | None = None,
     look: Look | None = None,
-    report: Report | None = None,
+    report: StepProgress | None = None,
 ) -> FaceSeries:
     """The face in every photo of a folder or in every frame of a video.
 
@@ -108,7 +106,7 @@ def find_faces(
 
 
 def load_pictures(
-    series: FaceSeries, rows: Collection[int], report: Report | None = None
+    series: FaceSeries, rows: Collection[int], report: StepProgress | None = None
 ) -> Iterator[tuple[int, Photo]]:
     """The pictures of some rows of a series with the rows, in the series' order."""
     if not series.is_video:
@@ -144,7 +142,7 @@ class _Gathered:
         self.told: list[tuple[str, str]] = []
         self.quarters = 0
 
-    def read_video(self, detector: LandmarkDetector, report: Report | None) -> None:
+    def read_video(self, detector: LandmarkDetector, report: StepProgress | None) -> None:
         """Every frame, looked at once."""
         self.is_video = True
         video = Video(self.source)
@@ -167,7 +165,7 @@ class _Gathered:
         self.notes += [f"{name}: {note}" for note in (*video.notes, *odd.notes)]
 
     def read_photos(
-        self, detector: LandmarkDetector, face: int | None, report: Report | None
+        self, detector: LandmarkDetector, face: int | None, report: StepProgress | None
     ) -> None:
         """Every photo, looked at as closely as `LandmarkDetector.detect` does."""
         folders = photo_files(self.source)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from mien.capture.video.frame_selection import FrameScores, choose_frames
 from mien.capture.video.orientation import turn_upright
 from mien.capture.video.video import Video
 from mien.errors import EstimationError
+from mien.progress import StepProgress
 
 MAX_SAMPLES = 240
 # Just under a tenth, so that rounded times of a 10 Hz clip do not skip frames.
@@ -49,7 +49,7 @@ def pick_frames(
     expressions: int | None = None,
     detector: LandmarkDetector,
     max_side: int = MAX_SIDE,
-    progress: Callable[[int, int], None] | None = None,
+    progress: StepProgress | None = None,
 ) -> PickedFrames:
     """Sharp frames with diverse poses of the head at rest, and one of each other expression.
 
@@ -101,9 +101,7 @@ def _choose_rows(
     }
 
 
-def _two_passes(
-    progress: Callable[[int, int], None] | None, frames: int
-) -> Callable[[int, int], None]:
+def _two_passes(progress: StepProgress | None, frames: int) -> StepProgress:
     """Progress of pass 0 or 1 at a frame as (done, total) of both."""
     if progress is None:
         return lambda step, frame: None
@@ -115,9 +113,7 @@ def _two_passes(
     return report
 
 
-def _judge(
-    video: Video, detector: LandmarkDetector, report: Callable[[int, int], None]
-) -> FrameScores:
+def _judge(video: Video, detector: LandmarkDetector, report: StepProgress) -> FrameScores:
     """Scores of the frames, evenly spread in time, that show a face."""
     step = max(_SAMPLE_SECONDS, (video.facts().seconds or 0) / MAX_SAMPLES)
     rows: list[tuple[int, float, DetectedFace]] = []

@@ -1,4 +1,4 @@
-"""The example folder: what `mien examples` leaves (docs/example-folder.md)."""
+"""The example folder: what `mien examples` leaves (docs/reference/example-folder.md)."""
 
 from __future__ import annotations
 

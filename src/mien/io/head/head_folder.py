@@ -1,4 +1,7 @@
-"""The head folder: what `mien build` leaves, readable without mien (docs/head-folder.md)."""
+"""The head folder: what `mien build` leaves, readable without mien.
+
+docs/reference/head-folder.md describes it.
+"""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 Source:
     ISO/IEC 14496-2 annex C, table C-1; the feature points' places on our mesh are our choice,
 
-listed in docs/animation.md.
+listed in docs/reference/timeline.md.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Timeline documents: a performance as JSON. docs/animation.md describes them."""
+"""Timeline documents: a performance as JSON. docs/reference/timeline.md describes them."""
 
 from __future__ import annotations
 

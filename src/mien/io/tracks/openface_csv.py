@@ -1,7 +1,7 @@
 """A track as a CSV like OpenFace 2's, for programs that read pose, gaze and action units from it.
 
 A row a frame, counted from 1: pose in the camera's frame (mm, radians), a gaze vector for each eye,
-FACS action units from 0 to 5. What is approximate: docs/track-files.md.
+FACS action units from 0 to 5. What is approximate: docs/reference/track-files.md.
 
 Source:
     OpenFace's wiki, "Output Format"; the order of its FeatureExtraction's columns.

@@ -1,6 +1,6 @@
 """Tracks as files: TRACK.csv, a row a frame, and beside it TRACK.json, which says what they mean.
 
-docs/track-files.md describes both.
+docs/reference/track-files.md describes both.
 """
 
 from __future__ import annotations

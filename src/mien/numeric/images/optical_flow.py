@@ -86,7 +86,7 @@ def _searcher(fine: bool) -> Any:
     """Not kept: it is not safe in two threads at once.
 
     On rendered pairs with exact truth these settings are as near to it as the preset's, in less
-    than half the time (docs/registration.md).
+    than half the time (docs/method/registration.md).
     """
     import cv2
 

@@ -20,11 +20,11 @@ from mien.io.tracks.track_csv import check_track_place, write_track
 from mien.io.tracks.track_journal import journal_of
 from mien.io.tracks.track_json import sidecar_of
 from mien.pipelines.explained import units_of
+from mien.progress import Progress
 from mien.reading.names import plain_name
 from mien.track.state import Track
 
 if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
     from mien.render.picture import HeadRenderer
 
 OVERLAY, PLOTS = "Drawing the overlay", "Drawing plots"

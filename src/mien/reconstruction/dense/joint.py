@@ -4,7 +4,8 @@ The places X_n = mean_n + sum_c c_c B_cn + d_n of the surface are unknown, with 
 about the coefficients c and the deviations d. Least squares over cameras and places together is
 biased where views are nearly affine: turning the cameras further apart flattens the shape, and
 with it every deviation from the prior, so that the turn grows without bound (48 degrees became 85
-on two real photos; docs/registration.md). The cure is that of regression with noisy regressors,
+on two real photos; docs/method/registration.md).
+The cure is that of regression with noisy regressors,
 instrumental variables: the equations of the cameras weigh the residuals with derivatives taken at
 the prior's mean, which does not know the deviations, instead of at the estimated places, which do.
 """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from mien.camera import Camera
 from mien.capture.source import View
 from mien.mesh import Mesh
 from mien.numeric.rotation import angle_between
+from mien.progress import StepProgress, no_step_progress
 from mien.reconstruction.dense.crops import finest_mm_per_px, visible_mesh
 from mien.reconstruction.dense.eyes import seat_eyes
 from mien.reconstruction.dense.joint import (
@@ -82,7 +83,7 @@ def register_views(
     generic: GenericHead,
     *,
     scales: Sequence[float] = SCALES_MM,
-    progress: Callable[[int, int], None] | None = None,
+    progress: StepProgress | None = None,
 ) -> Registration | None:
     """Cameras and shape from all the skin that the photos share, from coarse to fine.
 
@@ -97,7 +98,7 @@ def register_views(
     Returns:
         None where the photos share too little that looks alike.
     """
-    tell = progress or (lambda done, total: None)
+    tell = progress or no_step_progress
     prior = load_head_prior()
     problem = _Problem(views, features, lenses, generic, prior, _rotations(cameras))
     state = _State(tuple(cameras), vertices)

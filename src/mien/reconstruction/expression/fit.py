@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
 from mien.capture.source import View
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
+from mien.progress import StepProgress, no_step_progress
 from mien.reconstruction.expression.gaze import MOST_RAD, iris_directions, yaw_pitch_of
 from mien.reconstruction.expression.known_head import KnownHead, feature_sightings
 from mien.reconstruction.expression.skin_tracking import follow_skin
@@ -39,8 +40,6 @@ _STEADY = ("eyeLook", "tongueOut")
 _CLOSED = 0.5
 """Weight of a blink at which an iris cannot be seen any more."""
 
-Progress = Callable[[int, int], None]
-
 
 @dataclass(frozen=True)
 class ExpressionFit:
@@ -64,7 +63,7 @@ class ExpressionFit:
 
 
 def fit_expression(
-    views: Sequence[View], known: KnownHead, *, progress: Progress | None = None
+    views: Sequence[View], known: KnownHead, *, progress: StepProgress | None = None
 ) -> ExpressionFit:
     """Cameras, face units and shape of an expression, from one photo on.
 
@@ -81,7 +80,7 @@ def fit_expression(
     """
     from threadpoolctl import threadpool_limits
 
-    tell = progress or (lambda done, total: None)
+    tell = progress or no_step_progress
     left_out = {view.photo.name: NO_FACE for view in views if not view.marked}
     views = [view for view in views if view.marked]
     counts = gather_features(views, known.generic).seen.sum(axis=1) if views else []
@@ -109,7 +108,7 @@ class _Found:
     typical_misfits: Float[Array, " k"]
 
 
-def _fit(views: Sequence[View], known: KnownHead, tell: Progress) -> _Found:
+def _fit(views: Sequence[View], known: KnownHead, tell: StepProgress) -> _Found:
     generic = known.generic
     features = gather_features(views, generic)
     focal, focal_sd = _lenses(views, known)

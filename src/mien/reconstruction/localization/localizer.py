@@ -33,7 +33,7 @@ _PROMISING, _PROMISING_MM = 0.5, 4.0
 LEAST_AGREEMENT, AGREEMENT_MM = 0.45, 1.5
 """Share of the head that looks alike within so many mm. Measured: 0.5 to 0.95 where a camera is
 right, up to 0.21 for mirrored photos, for another head in the same skin, for wrong cameras
-(docs/registration.md)."""
+(docs/method/registration.md)."""
 _LEAST_AREA_MM2 = 1000.0
 
 
