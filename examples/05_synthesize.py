@@ -10,15 +10,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from mien import (
-    FaceState,
-    HeadRenderer,
-    Synthesizer,
-    gather_examples,
-    load_examples,
-    load_head,
-    write_examples,
-)
+from mien import FaceState, gather_examples, load_examples, load_head
+from mien.io import save_examples
+from mien.render import HeadRenderer
+from mien.synthesis import Synthesizer
 
 source = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("example-photos")
 folder = source.with_name(f"{source.stem}-examples")
@@ -43,7 +38,7 @@ if len(sys.argv) < 2:
 
 # The pictures that differ most become examples; all tell how the points move together.
 gathered = gather_examples(source)
-write_examples(folder, gathered.examples, why=gathered.why)
+save_examples(folder, gathered.examples, why=gathered.why)
 for note in gathered.notes:
     print("note:", note)
 

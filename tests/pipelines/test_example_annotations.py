@@ -12,8 +12,8 @@ from mien.arrays import Array
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.images.photos import Photo
 from mien.errors import FileFormatError
-from mien.io.landmarks.pts import points_to_ibug, write_pts
-from mien.io.landmarks.tem import points_to_tem, write_tem
+from mien.io.landmarks.pts import points_to_ibug, save_pts
+from mien.io.landmarks.tem import points_to_tem, save_tem
 from mien.pipelines.example_annotations import (
     annotation_notes,
     apply_annotations,
@@ -51,14 +51,14 @@ def test_no_annotations(layout: FeatureLayout, points: Array, photo: Photo) -> N
 
 
 def test_all_points_from_a_delineation(layout: FeatureLayout, points: Array, photo: Photo) -> None:
-    write_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
+    save_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
     annotated = load_annotated_points(photo.path, photo, layout)
     found = apply_annotations(layout, 100 + 0 * points + layout.template, annotated)
     np.testing.assert_allclose(found, points / 2, atol=1e-3)
 
 
 def test_some_points_from_ibug(layout: FeatureLayout, points: Array, photo: Photo) -> None:
-    write_pts(photo.path.with_suffix(".pts"), points_to_ibug(layout, points))
+    save_pts(photo.path.with_suffix(".pts"), points_to_ibug(layout, points))
     annotated = load_annotated_points(photo.path, photo, layout)
     assert 30 <= len(annotated) <= 40
     for name, place in annotated.items():
@@ -85,7 +85,7 @@ def test_annotations_for_heads_count_where_they_are_the_same_points(
 def test_json_takes_precedence_over_a_delineation(
     layout: FeatureLayout, points: Array, photo: Photo
 ) -> None:
-    write_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
+    save_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
     annotate(photo, layout=layout.name, points={"chin": [10, 20]})
     np.testing.assert_array_equal(load_annotated_points(photo.path, photo, layout)["chin"], [5, 10])
 
@@ -113,7 +113,7 @@ def test_points_of_other_kinds_are_noted_and_not_used(layout: FeatureLayout, pho
     annotate(photo, layout=layout.name, points={"chin": [200, 500]})
     assert annotation_notes(photo.path, layout) == []
     photo.path.with_suffix(".tem").write_text("2\n1 2\n3 4\n0\n")
-    write_pts(photo.path.with_suffix(".pts"), np.zeros((5, 2)))
+    save_pts(photo.path.with_suffix(".pts"), np.zeros((5, 2)))
     assert list(load_annotated_points(photo.path, photo, layout)) == ["chin"]
     template, ibug = annotation_notes(photo.path, layout)
     assert template.startswith("anna.tem is not used: expected 134 points (zhang134), 7 (dlib's 5")

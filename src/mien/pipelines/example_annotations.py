@@ -15,7 +15,7 @@ from mien.capture.annotations import AnnotationNames, load_annotations
 from mien.capture.folder import ANNOTATIONS
 from mien.capture.images.photos import Photo
 from mien.errors import OtherPointsError
-from mien.io.landmarks.points_file import read_points
+from mien.io.landmarks.points_file import load_feature_points
 from mien.reading.strict_json import read_json
 
 __all__ = [
@@ -63,7 +63,7 @@ def load_annotated_points(
     annotated: dict[str, Array] = {}
     for path in (path for path in paths if path not in for_heads):
         with suppress(OtherPointsError):
-            rows, points = read_points(path, layout)
+            rows, points = load_feature_points(path, layout)
             named = zip(rows, points, strict=True)
             annotated |= {layout.names[row]: point * photo.scale for row, point in named}
     for path in for_heads:
@@ -88,7 +88,7 @@ def annotation_notes(file: Path, layout: FeatureLayout) -> list[str]:
     for path in annotation_files(file):
         try:
             if not _is_for_heads(path):
-                read_points(path, layout)
+                load_feature_points(path, layout)
         except OtherPointsError as error:
             notes.append(f"{path.name} is not used: {error.problem}")
     return notes

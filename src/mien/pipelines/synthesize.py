@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mien.io.examples.example_folder import load_examples
-from mien.io.examples.weights_json import write_weights
+from mien.io.examples.weights_json import save_weights
 from mien.io.files.image import save_image
-from mien.io.landmarks.points_file import check_points_kind, write_points
+from mien.io.landmarks.points_file import check_points_kind, save_feature_points
 from mien.pipelines.synthesize_target import (
     HeadChoice,
     SynthesisTarget,
@@ -101,9 +101,9 @@ def synthesize_expression(
     save_image(output, result.synthesis.image)
     if weights is not None:
         synthesis = result.synthesis
-        write_weights(weights, synthesizer.examples, synthesis.coefficients, synthesis.hull_px)
+        save_weights(weights, synthesizer.examples, synthesis.coefficients, synthesis.hull_px)
     if save_points is not None:
-        write_points(save_points, synthesizer.examples.layout, result.synthesis.points)
+        save_feature_points(save_points, synthesizer.examples.layout, result.synthesis.points)
     report(DRAWING, 1, 1)
     return result
 

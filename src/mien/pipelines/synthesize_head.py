@@ -12,10 +12,10 @@ from mien.assets.feature_points import FeatureLayout
 from mien.capture.images.photos import load_photo
 from mien.errors import InputError
 from mien.head import Head
-from mien.io.examples.weights_json import write_shares
+from mien.io.examples.weights_json import save_shares
 from mien.io.files.image import save_image
 from mien.io.head.head_folder import load_head
-from mien.io.landmarks.points_json import read_points_json
+from mien.io.landmarks.points_json import load_points_json
 from mien.pipelines.head_in_photo import find_head
 from mien.pipelines.synthesize_target import check_request
 from mien.progress import Progress, no_progress
@@ -96,7 +96,7 @@ def synthesize_head(
     Raises:
         InputError: neither or both of points and photo, a place that cannot be written, points that
             are not in head space.
-        FileFormatError: as `load_head`, `read_points_json`.
+        FileFormatError: as `load_head`, `load_points_json`.
         EstimationError: no face in the photo that this head fits.
     """
     report = progress or no_progress
@@ -167,7 +167,7 @@ def _read_points(
     suffix = Path(path).suffix
     if suffix.lower() != ".json":
         raise InputError(path, "a .json of points in space", suffix or "no suffix")
-    named = read_points_json(path, layout, axes=3)
+    named = load_points_json(path, layout, axes=3)
     return np.array([layout.index(name) for name in named]), np.array(list(named.values()))
 
 
@@ -197,7 +197,7 @@ def _write_weights(
 ) -> None:
     names = synthesizer.rig.names
     photos = [", ".join(view.photo for view in head.expressions[name].views) for name in names]
-    write_shares(
+    save_shares(
         path,
         layout=synthesizer.layout.name,
         sources=dict(zip(names, photos, strict=True)),

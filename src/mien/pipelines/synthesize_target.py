@@ -15,7 +15,7 @@ from mien.capture.images.photos import load_photo
 from mien.errors import EstimationError, InputError
 from mien.io.files.atomic import check_file_place, check_files_apart
 from mien.io.files.image import image_kind
-from mien.io.landmarks.points_file import read_points
+from mien.io.landmarks.points_file import load_feature_points
 from mien.numeric.planar_similarity import PlanarMotion
 from mien.pipelines.example_annotations import (
     annotation_files,
@@ -104,17 +104,17 @@ def target_from_points(
 
     Args:
         synthesizer: of the person.
-        path: as for `read_points`.
+        path: as for `load_feature_points`.
         head: whether it is where the neutral photo has it, or moved: then its motion is estimated
             from the points, and the picture moves with it. "auto" takes the likelier of both.
 
     Raises:
         InputError: fewer than three points, points that look mirrored or lie far outside.
-        FileFormatError: as `read_points`.
+        FileFormatError: as `load_feature_points`.
         EstimationError: all points in one place.
     """
     layout = synthesizer.examples.layout
-    known, positions = read_points(path, layout)
+    known, positions = load_feature_points(path, layout)
     if len(known) < MIN_MOTION_POINTS:
         expected = f"at least {MIN_MOTION_POINTS} points of {layout.name}"
         raise InputError(path, expected, ", ".join(layout.names[index] for index in known))
