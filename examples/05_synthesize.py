@@ -49,9 +49,9 @@ synthesizer = Synthesizer(examples)
 # Corners of the mouth go up and out by a fortieth of the face; all other points follow, and then
 # the picture, every subregion from the examples that come nearest to it.
 step = np.ptp(neutral[:, 0]) / 40
-corners = {"right_mouth_corner": [-step, -step], "left_mouth_corner": [step, -step]}
-known = np.array([layout.index(name) for name in corners])
-points = synthesizer.complete(known, neutral[known] + list(corners.values()), head="still")
+shifts = {"right_mouth_corner": [-step, -step], "left_mouth_corner": [step, -step]}
+corners = {name: neutral[layout.index(name)] + shift for name, shift in shifts.items()}
+points = synthesizer.complete(corners, head="still")
 made = synthesizer.synthesize(points)
 
 path = folder.with_suffix(".png")
