@@ -30,7 +30,7 @@ from mien.io.files.atomic import atomic_folder, check_folder_place
 from mien.io.files.image import encode_image, load_image
 from mien.io.files.leftovers import put_back
 from mien.io.head.head_json import is_inside
-from mien.numeric.kernels.threads import side_by_side
+from mien.numeric.kernels.threads import run_concurrently
 from mien.reading.names import named_path
 from mien.reading.npz import ArrayFile
 from mien.reading.strict_json import as_list, as_object, as_text, check_format, need, read_json
@@ -177,7 +177,7 @@ def _from_json(folder: Path, data: dict[str, Any], layout: FeatureLayout) -> Exa
         partial(_example, folder, entry, f"examples[{i}]", layout)
         for i, entry in enumerate(entries)
     ]
-    examples = tuple(side_by_side(*reading))
+    examples = tuple(run_concurrently(*reading))
     if not examples:
         raise Broken("examples", "expected at least one, the neutral face; found none")
     names = [example.name for example in examples]
