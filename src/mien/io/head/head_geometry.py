@@ -10,7 +10,7 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.assets.generic import load_generic_head
-from mien.errors import Broken, FileFormatError
+from mien.errors import DocumentError, FileFormatError
 from mien.head import NEUTRAL
 from mien.limits import MAX_MM
 from mien.mesh import Mesh
@@ -102,7 +102,7 @@ def check_names(mesh: Mesh, unit_names: tuple[str, ...]) -> None:
     """Parts and units of a head of the generic topology are looked up by the generic names.
 
     Raises:
-        Broken: other ones, or in another order.
+        DocumentError: other ones, or in another order.
     """
     generic = load_generic_head()
     if mesh.vertices.shape != generic.mesh.vertices.shape:
@@ -115,4 +115,4 @@ def check_names(mesh: Mesh, unit_names: tuple[str, ...]) -> None:
             wrong = next((name for name in found if name not in expected), None)
             what = f"{wrong[:60]!r}" if wrong else f"{len(found)} of them, or another order"
             problem = f"expected the generic head's {len(expected)} in their order, found {what}"
-            raise Broken(place, problem)
+            raise DocumentError(place, problem)

@@ -9,14 +9,18 @@ from typing import Any
 import numpy as np
 
 from mien.animate.curves import INTERPOLATIONS, MIN_STEP, Curve, constant
-from mien.errors import Broken
+from mien.errors import DocumentError
 from mien.reading.strict_json import as_choice, as_list, as_number, as_object, complain, need
 
 _KEY = ("time", "value", "interpolation", "in", "out")
 
 
 def curve_from_json(value: object, place: str) -> Curve:
-    """The curve that a number, a list of keys or an object with keys stands for. Raises: Broken."""
+    """The curve that a number, a list of keys or an object with keys stands for.
+
+    Raises:
+        DocumentError: none of these; names the place.
+    """
     if isinstance(value, int | float):
         return constant(as_number(value, place))
     if not isinstance(value, list | dict):
@@ -27,14 +31,16 @@ def curve_from_json(value: object, place: str) -> Curve:
     usual = _interpolation(data, place, "cubic")
     keys = as_list(need(data, "keys", place), f"{place}.keys")
     if not keys:
-        raise Broken(f"{place}.keys", "expected at least one key, found none")
+        raise DocumentError(f"{place}.keys", "expected at least one key, found none")
     rows: list[tuple[float, float, str, float, float]] = []
     for index, key in enumerate(keys):
         where = f"{place}.keys[{index}]"
         row = _key(key, where, usual)
         if rows and row[0] - rows[-1][0] < MIN_STEP:
             before = f"{rows[-1][0]:g} s of the key before"
-            raise Broken(f"{where}.time", f"expected a time after the {before}, found {row[0]:g} s")
+            raise DocumentError(
+                f"{where}.time", f"expected a time after the {before}, found {row[0]:g} s"
+            )
         rows.append(row)
     times, values, kinds, *slopes = zip(*rows, strict=True)
     return Curve(np.array(times), np.array(values), kinds, np.array(slopes[0]), np.array(slopes[1]))
@@ -43,7 +49,7 @@ def curve_from_json(value: object, place: str) -> Curve:
 def _key(key: object, place: str, usual: str) -> tuple[float, float, str, float, float]:
     if isinstance(key, list):
         if len(key) != 2:
-            raise Broken(place, f"expected [time, value], found {len(key)} entries")
+            raise DocumentError(place, f"expected [time, value], found {len(key)} entries")
         key = {"time": key[0], "value": key[1]}
     data = as_object(key, place, _KEY)
     return (
