@@ -11,7 +11,7 @@ SOURCE = Path(__file__).parents[1] / "src" / "mien"
 
 # From the first stage to the last. Modules that share an entry may use each other.
 ORDER = (
-    ("errors", "limits", "progress"),
+    ("errors", "lazy", "limits", "progress"),
     ("arrays", "reading"),
     ("expression_names",),
     ("mesh", "camera"),

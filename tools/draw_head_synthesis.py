@@ -61,7 +61,7 @@ class Pictures:
         return _labelled(drawn[..., :3], text)
 
     def from_points(self, points: Float[Array, "n 3"]) -> list[Array]:
-        """What the points make of it, from three sides."""
+        """The expression of the points, from three sides."""
         face, tiles = self.synthesizer.synthesize(points).face, []
         for yaw in _YAWS:
             drawn = self._renderer.draw_posed(face, self._camera(yaw), background=_BACKGROUND)

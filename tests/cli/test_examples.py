@@ -17,7 +17,7 @@ from PIL import Image
 from filmed import grey, written
 from mien.arrays import Array
 from mien.cli.examples import examples
-from mien.io.examples.example_folder import load_examples, read_reasons
+from mien.io.examples.example_folder import load_examples, load_reasons
 from mien.io.head.head_folder import load_head
 from mien.pipelines.examples import ExampleRequest, gather_examples
 from mien.render.picture import HeadRenderer
@@ -87,7 +87,7 @@ def test_a_video(mien: Mien, clip: Path, tmp_path: Path) -> None:
     assert len(choice) == 7
     assert choice["frame_000006.png"] == "no face found"
     assert choice[f"{standard.name}.png"] == "standard, its mouth is most open"
-    assert read_reasons(out)[standard.name] == choice[f"{standard.name}.png"]
+    assert load_reasons(out)[standard.name] == choice[f"{standard.name}.png"]
     with Image.open(out / "examples.jpg") as sheet:
         assert sheet.width > sheet.height
 

@@ -13,11 +13,11 @@ from PIL import Image
 
 from mien.arrays import Array
 from mien.assets.feature_points import load_feature_layout
-from mien.io.examples.example_folder import write_examples
+from mien.io.examples.example_folder import save_examples
 from mien.io.files.image import load_image
-from mien.io.landmarks.points_json import read_points_json
-from mien.io.landmarks.pts import points_to_ibug, write_pts
-from mien.io.landmarks.tem import points_to_tem, write_tem
+from mien.io.landmarks.points_json import load_points_json
+from mien.io.landmarks.pts import points_to_ibug, save_pts
+from mien.io.landmarks.tem import points_to_tem, save_tem
 from mien.pipelines.demo import demo_photos
 from mien.synthesis.examples.example_set import ExampleSet
 from terminal import Mien
@@ -31,7 +31,7 @@ Asked = Callable[..., Path]
 def folder(james_set: ExampleSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """His example folder. Read only."""
     place = tmp_path_factory.mktemp("examples") / "james"
-    write_examples(place, james_set)
+    save_examples(place, james_set)
     return place
 
 
@@ -75,7 +75,7 @@ def test_all_points_are_saved_and_can_be_asked_for_again(
     first, again, saved = tmp_path / "a.png", tmp_path / "b.png", tmp_path / "S.json"
     path = asked(neutral, *names)
     mien("synthesize", folder, "-o", first, "--points", path, "--save-points", saved)
-    points = read_points_json(saved, LAYOUT)
+    points = load_points_json(saved, LAYOUT)
     assert list(points) == list(LAYOUT.names)
     np.testing.assert_allclose(points["menton"], neutral[LAYOUT.index("menton")], atol=1e-3)
     mien("synthesize", folder, "-o", again, "--points", saved, "--head", "still")
@@ -98,9 +98,9 @@ def test_points_of_other_programs(
 ) -> None:
     path = tmp_path / f"a{suffix}"
     if suffix == ".tem":
-        write_tem(path, points_to_tem(LAYOUT, neutral))
+        save_tem(path, points_to_tem(LAYOUT, neutral))
     else:
-        write_pts(path, points_to_ibug(LAYOUT, neutral))
+        save_pts(path, points_to_ibug(LAYOUT, neutral))
     data = mien("synthesize", folder, "-o", tmp_path / "o.png", "--points", path, "--json").json
     assert data["notes"] == []
     photo = load_image(folder / "photos" / "e0.png").astype(float)

@@ -14,7 +14,7 @@ from mien.arrays import Array
 from mien.assets.feature_points import load_feature_layout
 from mien.io.files.image import load_image
 from mien.io.head.head_folder import load_head
-from mien.io.landmarks.points_json import write_points_json
+from mien.io.landmarks.points_json import save_points_json
 from mien.synthesis.heads.feature_points import feature_points_on
 from terminal import Mien
 
@@ -135,7 +135,7 @@ def test_points_that_cannot_be_meant(
 
 
 def test_points_of_a_picture_are_refused(mien: Mien, expressive: Path, tmp_path: Path) -> None:
-    write_points_json(tmp_path / "P.json", LAYOUT, {"menton": np.array([4.0, 5.0])})
+    save_points_json(tmp_path / "P.json", LAYOUT, {"menton": np.array([4.0, 5.0])})
     (tmp_path / "a.pts").write_text("")
     asking = ("synthesize", expressive, "-o", tmp_path / "o.png", "--json", "--points")
     error = mien(*asking, tmp_path / "P.json").error

@@ -16,7 +16,7 @@ from mien.errors import FileFormatError, InputError
 from mien.head import NEUTRAL, Head
 from mien.io.files.atomic import check_file_place, check_files_apart
 from mien.io.timeline.timeline_check import check_timeline
-from mien.io.timeline.timeline_file import load_performance, performance_files
+from mien.io.timeline.timeline_file import load_timeline, timeline_files
 from mien.pipelines.explained import units_of
 from mien.progress import Progress, StepProgress, no_progress, stage_progress
 from mien.render.picture import GREY, HeadRenderer
@@ -92,7 +92,7 @@ def animate_head(
     leaves what was there.
 
     Args:
-        timeline: or the file that holds one (io.timeline.timeline_file.load_performance).
+        timeline: or the file that holds one (io.timeline.timeline_file.load_timeline).
         path: what to write, by its suffix: .mp4, .webm, .glb, .usdz, .csv (Live Link Face), .fap
             (MPEG-4); a name without one, or with a slash at its end, is a folder of pictures.
         fps: frames a second; the timeline's unless given.
@@ -109,10 +109,10 @@ def animate_head(
         FileFormatError: the timeline; what in it the head cannot do, by place; more than
             MAX_FRAMES.
     """
-    files = [] if isinstance(timeline, Timeline) else performance_files(timeline)
+    files = [] if isinstance(timeline, Timeline) else timeline_files(timeline)
     write = _writer(path, [*files, *read])
     name = timeline if isinstance(timeline, (str, Path)) else "timeline"
-    played = timeline if isinstance(timeline, Timeline) else load_performance(timeline)
+    played = timeline if isinstance(timeline, Timeline) else load_timeline(timeline)
     check_timeline(played, expressions=head.expressions, units=head.unit_names, path=name)
     tell = progress or no_progress
     job = _Job(
@@ -185,17 +185,17 @@ def _writer(path: str | Path, read: Iterable[str | Path]) -> Callable[[_Job, str
 
 
 def _write_pictures(job: _Job, path: str | Path) -> int:
-    from mien.io.files.frames import write_frames
+    from mien.io.files.frames import save_frames
 
-    return write_frames(path, job.pictures(job.background))
+    return save_frames(path, job.pictures(job.background))
 
 
 def _write_video(job: _Job, path: str | Path) -> int:
-    from mien.io.files.video import write_video
+    from mien.io.files.video import save_video
 
     opaque = Path(path).suffix.lower() == ".mp4"
     background = job.background or (GREY if opaque else None)
-    return write_video(path, job.pictures(background), job.fps)
+    return save_video(path, job.pictures(background), job.fps)
 
 
 def _write_model(job: _Job, path: str | Path) -> int:
@@ -208,21 +208,21 @@ def _write_model(job: _Job, path: str | Path) -> int:
 
 
 def _write_live_link(job: _Job, path: str | Path) -> int:
-    from mien.io.live.live_link import write_live_link
+    from mien.io.live.live_link import save_live_link
 
     head = job.renderer.head
-    return write_live_link(path, job.moments(), units_of=lambda state: units_of(head, state))
+    return save_live_link(path, job.moments(), units_of=lambda state: units_of(head, state))
 
 
 def _write_fap(job: _Job, path: str | Path) -> int:
-    from mien.io.timeline.fap import FapMeter, write_fap
+    from mien.io.timeline.fap import FapMeter, save_fap
 
     meter = FapMeter.of(job.renderer.head.mesh.vertices)
     values = (
         meter.read(job.renderer.rig.evaluate(moment.state).vertices, moment.rotation)
         for moment in job.moments()
     )
-    return write_fap(path, values, job.fps)
+    return save_fap(path, values, job.fps)
 
 
 _WRITERS: dict[str, Callable[[_Job, str | Path], int]] = {

@@ -16,7 +16,7 @@ from mien.capture.source import Capture, load_capture
 from mien.errors import EstimationError
 from mien.head import ATLAS, CYLINDER, NEUTRAL, Expression, FittedView, Head
 from mien.io.files.manifest import kept_notes
-from mien.io.files.video import write_video
+from mien.io.files.video import save_video
 from mien.io.head.head_folder import check_head_place, head_place, write_head
 from mien.progress import Progress, StepProgress, no_progress, stage_progress
 from mien.reconstruction.expression.fit import ExpressionFit, fit_expression
@@ -315,7 +315,7 @@ def build_head_folder(
                 file = (place / "annotations" / view.photo.name).with_suffix(".json")
                 save_annotations(file, view.photo, view.annotations)
         tell(stage, 1, 2)
-        write_video(place / TURNTABLE, turntable_frames(result.head), fps=24)
+        save_video(place / TURNTABLE, turntable_frames(result.head), fps=24)
         tell(stage, 2, 2)
         report = ReportInput(
             result.head, photos, result.fits, result.coverage, result.notes, TURNTABLE

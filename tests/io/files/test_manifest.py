@@ -11,7 +11,7 @@ import pytest
 from mien.errors import InputError
 from mien.io.files import atomic
 from mien.io.files.atomic import atomic_folder, check_files_apart, check_side_file
-from mien.io.files.manifest import MANIFEST, kept_notes, own_files, read_manifest
+from mien.io.files.manifest import MANIFEST, kept_notes, load_manifest, own_files
 
 
 def always(folder: Path) -> bool:
@@ -37,7 +37,7 @@ def place(tmp_path: Path) -> Path:
 
 
 def test_all_of_a_new_folder_is_miens(place: Path) -> None:
-    manifest = read_manifest(place)
+    manifest = load_manifest(place)
     assert manifest is not None
     assert set(manifest.files) == {"a", "deep/b", "old"}
     assert own_files(place) == []
@@ -181,7 +181,7 @@ def test_a_folder_with_the_name_of_the_list(place: Path) -> None:
     (place / MANIFEST).mkdir()
     (place / MANIFEST / "x").write_text("mine")
     write(place, {"a": "new", "deep/b": "new", "old": "new"})
-    assert read_manifest(place) is not None
+    assert load_manifest(place) is not None
     assert (place / "kept" / MANIFEST / "x").read_text() == "mine"
 
 

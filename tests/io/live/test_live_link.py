@@ -14,7 +14,7 @@ from mien.animate.perform import frames_of, moments
 from mien.animate.timeline import Timeline
 from mien.assets.generic import load_generic_head
 from mien.errors import FileFormatError, InputError
-from mien.io.live.live_link import UNITS, timecode, write_live_link
+from mien.io.live.live_link import UNITS, save_live_link, timecode
 from mien.io.live.live_link_read import load_live_link
 
 HEADER = (
@@ -40,7 +40,7 @@ def performance(fps: float = 30.0, seconds: float = 2.5, **more: Curve) -> Timel
 
 
 def test_the_header_is_the_apps(tmp_path: Path) -> None:
-    write_live_link(tmp_path / "a.csv", moments(performance()))
+    save_live_link(tmp_path / "a.csv", moments(performance()))
     assert (tmp_path / "a.csv").read_text().splitlines()[0] == HEADER
     assert sorted(UNITS) == sorted(load_generic_head().unit_names)
 
@@ -50,7 +50,7 @@ def test_the_header_is_the_apps(tmp_path: Path) -> None:
 def test_a_performance_comes_back(tmp_path: Path, fps: float, seconds: float) -> None:
     timeline = performance(fps, seconds)
     given = list(moments(timeline))
-    assert write_live_link(tmp_path / "a.csv", given) == len(given)
+    assert save_live_link(tmp_path / "a.csv", given) == len(given)
     loaded = load_live_link(tmp_path / "a.csv")
     times = np.array([moment.time for moment in given])
     assert loaded.fps == pytest.approx(fps, rel=2e-3)
@@ -66,7 +66,7 @@ def test_a_performance_comes_back(tmp_path: Path, fps: float, seconds: float) ->
 
 def test_angles_have_the_apps_signs(tmp_path: Path) -> None:
     tracks = {"gaze.yaw": constant(0.2), "gaze.pitch": constant(-0.1), "head.yaw": constant(0.3)}
-    write_live_link(tmp_path / "a.csv", moments(Timeline(0.01, tracks=tracks)))
+    save_live_link(tmp_path / "a.csv", moments(Timeline(0.01, tracks=tracks)))
     row = next(csv.DictReader((tmp_path / "a.csv").read_text().splitlines()))
     number = {name: float(row[name]) for name in HEADER.split(",")[2:]}
     # As in a recording of the app: looking left and down, EyeLookOutLeft and EyeLookInRight go
@@ -84,7 +84,7 @@ def test_what_is_written_can_be_read(tmp_path: Path) -> None:
     """Eyes that look farther than any, and expressions whose units add up."""
     tracks = {"gaze.yaw": constant(1.2), "units.eyeLookOutLeft": constant(1.0)}
     units = {"jawOpen": 1.9, "mouthPucker": -0.8}
-    write_live_link(
+    save_live_link(
         tmp_path / "a.csv", moments(Timeline(0.1, tracks=tracks)), units_of=lambda state: units
     )
     found = load_live_link(tmp_path / "a.csv").at(0).state.units
@@ -100,7 +100,7 @@ def test_head_angles_are_unreals(tmp_path: Path) -> None:
 
 def test_units_of_lets_the_caller_explain_expressions(tmp_path: Path) -> None:
     timeline = Timeline(0.1, tracks={"mouth.joy": constant(0.5)})
-    write_live_link(
+    save_live_link(
         tmp_path / "a.csv",
         moments(timeline),
         units_of=lambda state: {"mouthSmileLeft": state.expressions["mouth"]["joy"]},
@@ -238,12 +238,12 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
 
 def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="at least one frame to write"):
-        write_live_link(tmp_path / "a.csv", [])
+        save_live_link(tmp_path / "a.csv", [])
     timeline = Timeline(0.1, tracks={"units.earWiggle": constant(1)})
     with pytest.raises(InputError, match=r"one of the 52 .* got earWiggle"):
-        write_live_link(tmp_path / "a.csv", moments(timeline))
+        save_live_link(tmp_path / "a.csv", moments(timeline))
     with pytest.raises(InputError, match="a frame at 0 s or later, got -1 s"):
-        write_live_link(tmp_path / "a.csv", [Timeline(1.0).at(-1.0)])
+        save_live_link(tmp_path / "a.csv", [Timeline(1.0).at(-1.0)])
     assert not list(tmp_path.iterdir())
 
 

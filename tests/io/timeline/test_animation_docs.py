@@ -14,7 +14,7 @@ from mien.animate.channels import REGIONS
 from mien.animate.layers import GENERATORS
 from mien.io.timeline.fap_table import PARAMETERS
 from mien.io.timeline.timeline_check import check_timeline
-from mien.io.timeline.timeline_json import DEGREES, load_timeline
+from mien.io.timeline.timeline_json import DEGREES, load_timeline_json
 
 REFERENCE = Path(__file__).parents[3] / "docs" / "reference"
 PAGE = "".join((REFERENCE / name).read_text("utf-8") for name in ("timeline.md", "fap.md"))
@@ -24,7 +24,7 @@ def test_the_example_loads(tmp_path: Path) -> None:
     example = re.search(r"```json\n(.*?)```", PAGE, re.DOTALL)
     assert example is not None
     (tmp_path / "a.json").write_text(example[1])
-    timeline = load_timeline(tmp_path / "a.json")
+    timeline = load_timeline_json(tmp_path / "a.json")
     units = ("jawOpen", "browInnerUp", "mouthSmileLeft", "eyeBlinkLeft", "eyeBlinkRight")
     check_timeline(timeline, expressions=("joy", "anger"), units=units)
     state = timeline.at(3.4).state

@@ -32,7 +32,7 @@ def test_every_number_is_there(track: Track) -> None:
     for row, found in enumerate(track.frames):
         if found.state is None:
             continue
-        assert series.numbers[row] == found.frame
+        assert (series.numbers[row], series.times[row]) == (found.frame, found.time)
         assert series.status[row] == found.status
         assert (series.rms[row], series.seen[row]) == (found.rms, found.seen)
         np.testing.assert_array_equal(series.rotations[row], found.state.R_cam_head)

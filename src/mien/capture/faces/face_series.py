@@ -16,7 +16,7 @@ from mien.capture.faces.sharpness import face_sharpness
 from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
 from mien.capture.images.photos import Photo, load_photo
 from mien.capture.notes import gathered_notes
-from mien.capture.source_kind import kind_of_source
+from mien.capture.source_kind import SourceKind, kind_of_source
 from mien.capture.video.clip_notes import ClipNotes
 from mien.capture.video.frame_photos import fetch_frames, frame_name
 from mien.capture.video.frame_selection import FrameScores
@@ -76,6 +76,7 @@ def find_faces(
     detector: LandmarkDetector,
     *,
     max_side: int,
+    kind: SourceKind | None = None,
     face: int | None = None,
     look: Look | None = None,
     report: StepProgress | None = None,
@@ -84,6 +85,7 @@ def find_faces(
 
     Args:
         max_side: px; larger pictures are reduced to it.
+        kind: of the source, if it is known already.
         face: as for LandmarkDetector.detect, of photos; a video's is the largest.
         look: called with each picture that shows the face, as long as its pixels are there.
 
@@ -92,7 +94,7 @@ def find_faces(
         FileFormatError: as InputError.
         EstimationError: no picture shows a face.
     """
-    kind, source = kind_of_source(source), Path(source)
+    kind, source = kind or kind_of_source(source), Path(source)
     gathered = _Gathered(source, max_side, look or (lambda pixels, landmarks: None))
     if kind == "video":
         if face is not None:

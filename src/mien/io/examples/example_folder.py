@@ -41,9 +41,9 @@ __all__ = [
     "check_example_place",
     "is_example_folder",
     "load_examples",
-    "read_reasons",
+    "load_reasons",
+    "save_examples",
     "write_example_files",
-    "write_examples",
 ]
 
 INDEX, SUBREGIONS = "examples.json", "subregions.npz"
@@ -55,7 +55,7 @@ _PAIR = re.compile(r"\[\n\s*([-+\d.e]+),\n\s*([-+\d.e]+)\n\s*\]")
 """Two numbers, one a line: a place, which reads better in one line."""
 
 
-def write_examples(
+def save_examples(
     folder: str | Path, example_set: ExampleSet, *, why: Mapping[str, str] | None = None
 ) -> None:
     """Write an example folder in place of the one that is there, whole or not at all.
@@ -73,7 +73,7 @@ def write_examples(
 def write_example_files(
     folder: Path, example_set: ExampleSet, *, why: Mapping[str, str] | None = None
 ) -> None:
-    """As write_examples, but straight into an empty folder: for a caller that adds more to it."""
+    """As save_examples, but straight into an empty folder: for a caller that adds more to it."""
     for example in example_set.examples:
         if not is_inside(f"{example.name}.png") or "/" in example.name:
             raise InputError("example", "a name that can be a file's", repr(example.name))
@@ -137,7 +137,7 @@ def load_examples(folder: str | Path, *, layout: FeatureLayout | None = None) ->
         raise FileFormatError(path, f"{error} (or the other files do not fit it)") from None
 
 
-def read_reasons(folder: str | Path) -> dict[str, str]:
+def load_reasons(folder: str | Path) -> dict[str, str]:
     """Why each example was chosen, by name. Raises: as load_examples."""
     path, data = _read_index(Path(folder))
     try:

@@ -13,14 +13,14 @@ from mien.arrays import Array, Float, check_array
 from mien.io.files.atomic import atomic_file
 from mien.synthesis.examples.example_set import ExampleSet
 
-__all__ = ["FORMAT", "VERSION", "write_shares", "write_weights"]
+__all__ = ["FORMAT", "VERSION", "save_shares", "save_weights"]
 
 FORMAT, VERSION = "mien weights", 1
 _LEAST = 1e-4
 """A smaller share changes no pixel by more than a fortieth of a grey level."""
 
 
-def write_weights(
+def save_weights(
     path: str | Path,
     examples: ExampleSet,
     coefficients: Float[Array, "r m"],
@@ -35,7 +35,7 @@ def write_weights(
     Raises:
         InputError: shapes, NaN, the place.
     """
-    write_shares(
+    save_shares(
         path,
         layout=examples.layout.name,
         sources={example.name: example.source for example in examples.examples},
@@ -45,7 +45,7 @@ def write_weights(
     )
 
 
-def write_shares(
+def save_shares(
     path: str | Path,
     *,
     layout: str,

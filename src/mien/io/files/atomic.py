@@ -20,8 +20,8 @@ from mien.io.files.manifest import (
     Seen,
     keep_late_files,
     keep_own_files,
-    read_manifest,
-    write_manifest,
+    load_manifest,
+    save_manifest,
 )
 from mien.reading.names import named_path
 
@@ -154,7 +154,7 @@ def atomic_folder(
             check_folder_place(path, replaces=replaces, read=read)
             seen: Seen | None = None
             if stay is not None:
-                write_manifest(temporary)
+                save_manifest(temporary)
                 seen = keep_own_files(target, temporary, stay=stay)
             _tree_to_disk(temporary)
             _swap(temporary, target, seen)
@@ -248,7 +248,7 @@ def _belongs(path: Path, folder: Path) -> bool:
     inside, above = _target(path), _target(folder)
     if not (above.is_dir() and inside.is_relative_to(above)):
         return False
-    manifest = read_manifest(above)
+    manifest = load_manifest(above)
     return inside.exists() if manifest is None else _name_in(inside, above) in manifest.files
 
 

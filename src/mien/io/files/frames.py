@@ -15,7 +15,7 @@ _OF_THE_SYSTEM = {".DS_Store", "Thumbs.db", "desktop.ini"}
 """Left by file managers in every folder that they show; nobody misses them."""
 
 
-def write_frames(
+def save_frames(
     path: str | Path,
     frames: Iterable[UInt8[Array, "h w c"]],
     *,
@@ -55,7 +55,7 @@ def write_frames(
 
 
 def check_frames_place(path: str | Path, *, read: Iterable[str | Path] = ()) -> None:
-    """Refuse, before any frame is made, a folder that write_frames could not take.
+    """Refuse, before any frame is made, a folder that save_frames could not take.
 
     Raises:
         InputError: a file is in the way, a folder that holds other things or what is read.

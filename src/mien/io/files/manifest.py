@@ -49,7 +49,7 @@ class Manifest:
         return False
 
 
-def write_manifest(folder: Path) -> None:
+def save_manifest(folder: Path) -> None:
     """List all files of a folder that mien has just written."""
     files = {name: [(folder / name).stat().st_size, _digest(folder / name)] for name in _in(folder)}
     data: dict[str, Any] = {"format": _FORMAT, "version": _VERSION, "files": files}
@@ -57,7 +57,7 @@ def write_manifest(folder: Path) -> None:
     (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
 
 
-def read_manifest(folder: Path) -> Manifest | None:
+def load_manifest(folder: Path) -> Manifest | None:
     """None where there is none, or none that can be read: then nothing counts as mien's."""
     try:
         data = read_json(folder / MANIFEST)
@@ -72,7 +72,7 @@ def own_files(folder: Path) -> list[str]:
 
     Without a list that is all of them.
     """
-    manifest = read_manifest(folder) or Manifest({})
+    manifest = load_manifest(folder) or Manifest({})
     return [name for name in _in(folder) if not manifest.describes(folder, name)]
 
 
@@ -93,7 +93,7 @@ def keep_own_files(old: Path, new: Path, *, stay: Collection[str] = ()) -> Seen:
     if not old.exists():
         return frozenset()
     seen = _seen(old)
-    known = (read_manifest(old) or Manifest({})).files
+    known = (load_manifest(old) or Manifest({})).files
     # Those that mien never knew come first: they have a right to their places, in `kept/`, too.
     for name in sorted(own_files(old), key=known.__contains__):
         _bring(old, new, name, changed=name in known, over=name in stay)

@@ -33,7 +33,7 @@ _PIXELS = {3: "yuv420p", 4: "yuva420p"}
 _BT709, _LIMITED_RANGE = 1, 1
 
 
-def write_video(
+def save_video(
     path: str | Path,
     frames: Iterable[UInt8[Array, "h w c"]],
     fps: float,
@@ -91,7 +91,7 @@ def write_video(
 
 
 def check_video_place(path: str | Path) -> None:
-    """Refuse, before any frame is made, a place that write_video would not take.
+    """Refuse, before any frame is made, a place that save_video would not take.
 
     Raises:
         InputError: another suffix, a place that cannot be written.

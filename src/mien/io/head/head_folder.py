@@ -19,7 +19,7 @@ from mien.head import NEUTRAL, Expression, Head
 from mien.io.files.atomic import atomic_folder, check_folder_place
 from mien.io.files.image import encode_image, load_image
 from mien.io.files.leftovers import put_back
-from mien.io.head.head_geometry import check_names, read_geometry
+from mien.io.head.head_geometry import check_names, load_geometry
 from mien.io.head.head_json import (
     FORMAT,
     Json,
@@ -32,7 +32,7 @@ from mien.io.head.head_json import (
     texture_files,
     views_from_json,
 )
-from mien.io.head.region_masks import MASK_FILES, read_masks, write_masks
+from mien.io.head.region_masks import MASK_FILES, load_masks, save_masks
 from mien.limits import MAX_SIDE
 from mien.reading.names import named_path
 from mien.reading.strict_json import as_names, as_object, as_text, join, need, read_json
@@ -91,7 +91,7 @@ def write_head(
     (folder / "textures").mkdir()
     for name, texture in head.textures.items():
         (folder / "textures" / f"{name}.png").write_bytes(encode_image(texture, "PNG"))
-    write_masks(folder, head.mesh, head.regions)
+    save_masks(folder, head.mesh, head.regions)
     for name, annotation in (annotations or {}).items():
         file = folder / "annotations" / f"{name}.json"
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -148,7 +148,7 @@ def _head_from(folder: Path, data: Json) -> Head:
         raise Broken(f"expressions.{NEUTRAL}", "missing")
     unit_names = as_names(need(data, "face_units", ""), "face_units")
     part_names = as_names(need(data, "parts", ""), "parts")
-    geometry = read_geometry(folder / GEOMETRY, tuple(described), part_names, len(unit_names))
+    geometry = load_geometry(folder / GEOMETRY, tuple(described), part_names, len(unit_names))
     check_names(geometry.mesh, unit_names)
     shapes = {
         name: Expression(
@@ -170,7 +170,7 @@ def _head_from(folder: Path, data: Json) -> Head:
         unit_names=unit_names,
         unit_offsets=geometry.unit_offsets,
         textures=textures,
-        regions=read_masks(folder, geometry.mesh),
+        regions=load_masks(folder, geometry.mesh),
         shading=shading_from_json(data),
         left_out=texts_from_json(data, "left_out"),
         generator=as_text(need(data, "generator", ""), "generator"),

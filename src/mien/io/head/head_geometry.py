@@ -38,7 +38,7 @@ class HeadGeometry:
     unit_offsets: Float[Array, "k v 3"]
 
 
-def read_geometry(
+def load_geometry(
     path: Path, expressions: Sequence[str], part_names: tuple[str, ...], units: int
 ) -> HeadGeometry:
     """The arrays in a file.

@@ -19,7 +19,7 @@ MASK_FILES = frozenset(f"{FOLDER}/{name}.png" for name in MASKS)
 _SIDE = 1024
 
 
-def write_masks(folder: Path, mesh: Mesh, masks: dict[str, Float[Array, " v"]]) -> None:
+def save_masks(folder: Path, mesh: Mesh, masks: dict[str, Float[Array, " v"]]) -> None:
     """`regions/NAME.png` for each mask, (V,) in [0, 1]: white where the region is."""
     if not masks:
         return
@@ -33,7 +33,7 @@ def write_masks(folder: Path, mesh: Mesh, masks: dict[str, Float[Array, " v"]]) 
         (folder / FOLDER / f"{name}.png").write_bytes(encode_image(picture, "PNG"))
 
 
-def read_masks(folder: Path, mesh: Mesh) -> dict[str, Float[Array, " v"]]:
+def load_masks(folder: Path, mesh: Mesh) -> dict[str, Float[Array, " v"]]:
     """The masks in a head folder, (V,) in [0, 1]; those whose file is missing are left out.
 
     Pictures of any size will do, as long as they have the texture's layout.

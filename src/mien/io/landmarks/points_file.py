@@ -10,22 +10,22 @@ import numpy as np
 from mien.arrays import Array, Float, Int, check_array
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import InputError, OtherPointsError
-from mien.io.landmarks.points_json import read_points_json, write_points_json
-from mien.io.landmarks.pts import IBUG_COUNT, points_from_ibug, points_to_ibug, read_pts, write_pts
-from mien.io.landmarks.tem import points_from_tem, points_to_tem, read_tem, write_tem
+from mien.io.landmarks.points_json import load_points_json, save_points_json
+from mien.io.landmarks.pts import IBUG_COUNT, load_pts, points_from_ibug, points_to_ibug, save_pts
+from mien.io.landmarks.tem import load_tem, points_from_tem, points_to_tem, save_tem
 
-__all__ = ["check_points_kind", "read_points", "write_points"]
+__all__ = ["check_points_kind", "load_feature_points", "save_feature_points"]
 
 Named = dict[str, Float[Array, " 2"]]
 
 
-def read_points(
+def load_feature_points(
     path: str | Path, layout: FeatureLayout
 ) -> tuple[Int[Array, " k"], Float[Array, "k 2"]]:
     """Indices of the points that a file holds, in rising order, and where they are, px.
 
     Args:
-        path: `.json`, as `read_points_json` has it; `.tem` of Psychomorph or WebMorph; `.pts` of
+        path: `.json`, as `load_points_json` has it; `.tem` of Psychomorph or WebMorph; `.pts` of
             iBUG's 68 points. Of the last two, those that the layout shares are taken.
 
     Raises:
@@ -47,7 +47,9 @@ def check_points_kind(path: str | Path) -> str:
     return kind
 
 
-def write_points(path: str | Path, layout: FeatureLayout, points: Float[Array, "n 2"]) -> None:
+def save_feature_points(
+    path: str | Path, layout: FeatureLayout, points: Float[Array, "n 2"]
+) -> None:
     """Write all points of a layout, px, in the way that the file's ending tells.
 
     Args:
@@ -63,30 +65,30 @@ def write_points(path: str | Path, layout: FeatureLayout, points: Float[Array, "
 
 
 def _to_json(path: Path, layout: FeatureLayout, points: Float[Array, "n 2"]) -> None:
-    write_points_json(path, layout, dict(zip(layout.names, points, strict=True)))
+    save_points_json(path, layout, dict(zip(layout.names, points, strict=True)))
 
 
 def _to_tem(path: Path, layout: FeatureLayout, points: Float[Array, "n 2"]) -> None:
-    write_tem(path, points_to_tem(layout, points))
+    save_tem(path, points_to_tem(layout, points))
 
 
 def _to_pts(path: Path, layout: FeatureLayout, points: Float[Array, "n 2"]) -> None:
-    write_pts(path, points_to_ibug(layout, points))
+    save_pts(path, points_to_ibug(layout, points))
 
 
 def _from_tem(path: Path, layout: FeatureLayout) -> Named:
-    return points_from_tem(read_tem(path), layout, path)
+    return points_from_tem(load_tem(path), layout, path)
 
 
 def _from_pts(path: Path, layout: FeatureLayout) -> Named:
-    points = read_pts(path)
+    points = load_pts(path)
     if len(points) != IBUG_COUNT:
         raise OtherPointsError(path, f"expected iBUG's {IBUG_COUNT} points, found {len(points)}")
     return points_from_ibug(points, layout)
 
 
 _READERS: dict[str, Callable[[Path, FeatureLayout], Named]] = {
-    ".json": read_points_json,
+    ".json": load_points_json,
     ".tem": _from_tem,
     ".pts": _from_pts,
 }

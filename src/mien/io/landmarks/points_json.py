@@ -23,12 +23,12 @@ from mien.reading.strict_json import (
     unknown,
 )
 
-__all__ = ["read_points_json", "write_points_json"]
+__all__ = ["load_points_json", "save_points_json"]
 
 _KEYS = ("layout", "points")
 
 
-def read_points_json(
+def load_points_json(
     path: str | Path, layout: FeatureLayout, *, axes: int = 2
 ) -> dict[str, Float[Array, " d"]]:
     """The points in a file, by name, px: `{"layout": "zhang134", "points": {"NAME": [X, Y]}}`.
@@ -47,7 +47,7 @@ def read_points_json(
         raise FileFormatError(path, broken.problem, broken.place) from None
 
 
-def write_points_json(
+def save_points_json(
     path: str | Path, layout: FeatureLayout, points: Mapping[str, Float[Array, " d"]]
 ) -> None:
     """Writes some or all points of a layout, to a thousandth of a pixel or of a mm.

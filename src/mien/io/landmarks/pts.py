@@ -15,7 +15,7 @@ from mien.limits import MAX_POINTS_BYTES
 from mien.reading.files import read_text
 from mien.reading.text_numbers import Numbers
 
-__all__ = ["IBUG_SHARED", "points_from_ibug", "points_to_ibug", "read_pts", "write_pts"]
+__all__ = ["IBUG_SHARED", "load_pts", "points_from_ibug", "points_to_ibug", "save_pts"]
 
 IBUG_COUNT = 68
 _FILE = re.compile(r"\s*version:\s*1(?:\.0*)?\s+n_points:\s*(\d{1,5})\s*\{([^{}]*)\}\s*", re.ASCII)
@@ -72,7 +72,7 @@ _PARTNER = {
 }
 
 
-def read_pts(path: str | Path) -> Float[Array, "n 2"]:
+def load_pts(path: str | Path) -> Float[Array, "n 2"]:
     """The points of a file, (N, 2) px, the first pixel's centre at (0.5, 0.5).
 
     Raises:
@@ -97,7 +97,7 @@ def read_pts(path: str | Path) -> Float[Array, "n 2"]:
     return np.array(points) - FIRST_CENTRE + 0.5
 
 
-def write_pts(path: str | Path, points: Float[Array, "n 2"]) -> None:
+def save_pts(path: str | Path, points: Float[Array, "n 2"]) -> None:
     """Writes (N, 2) px, the first pixel's centre at (0.5, 0.5), to a thousandth of a pixel.
 
     Raises:

@@ -15,7 +15,7 @@ from mien.io.files.atomic import atomic_file
 from mien.io.landmarks.tem_templates import TEMPLATES
 from mien.reading.text_numbers import Numbers
 
-__all__ = ["Delineation", "TemLine", "points_from_tem", "points_to_tem", "read_tem", "write_tem"]
+__all__ = ["Delineation", "TemLine", "load_tem", "points_from_tem", "points_to_tem", "save_tem"]
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Delineation:
     lines: tuple[TemLine, ...]
 
 
-def read_tem(path: str | Path) -> Delineation:
+def load_tem(path: str | Path) -> Delineation:
     """The delineation in a file.
 
     Raises:
@@ -61,7 +61,7 @@ def _line(numbers: Numbers, count: int) -> TemLine:
     return TemLine(closed, np.array(points))
 
 
-def write_tem(path: str | Path, delineation: Delineation) -> None:
+def save_tem(path: str | Path, delineation: Delineation) -> None:
     """Writes a delineation, to a thousandth of a pixel.
 
     Raises:

@@ -50,7 +50,7 @@ LOOK_RANGE = float(np.radians(30))
 """Angle that an EyeLook unit of 1 stands for; 26 to 40 degrees in recordings of the app."""
 
 
-def write_live_link(
+def save_live_link(
     path: str | Path,
     moments: Iterable[Moment],
     *,

@@ -142,7 +142,7 @@ class FapMeter:
         return np.round(values[1:]).astype(np.int64)
 
 
-def write_fap(
+def save_fap(
     path: str | Path, values: Iterable[Int[Array, " 68"]], fps: float, *, name: str | None = None
 ) -> int:
     """Write parameters as a text .fap file, whole or not at all.

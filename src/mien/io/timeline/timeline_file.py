@@ -8,24 +8,24 @@ from mien.animate.timeline import Timeline
 from mien.errors import InputError
 
 
-def load_performance(path: str | Path) -> Timeline:
+def load_timeline(path: str | Path) -> Timeline:
     """The timeline in a .json document, a Live Link Face .csv recording or a TRACK.csv.
 
     Raises:
         InputError: another suffix, a file that cannot be read, a track without a face.
-        FileFormatError: as load_timeline, load_live_link and load_track.
+        FileFormatError: as load_timeline_json, load_live_link and load_track.
     """
-    from mien.io.timeline.timeline_json import load_timeline
+    from mien.io.timeline.timeline_json import load_timeline_json
 
-    loaders = {".json": load_timeline, ".csv": _load_table}
+    loaders = {".json": load_timeline_json, ".csv": _load_table}
     suffix = Path(path).suffix.lower()
     if suffix not in loaders:
         raise InputError(path, f"a name that ends in {' or '.join(loaders)}", suffix or "no suffix")
     return loaders[suffix](path)
 
 
-def performance_files(path: str | Path) -> list[Path]:
-    """The files that load_performance reads: of a track what lies beside it, too."""
+def timeline_files(path: str | Path) -> list[Path]:
+    """The files that load_timeline reads: of a track what lies beside it, too."""
     from mien.io.tracks.track_json import sidecar_of
 
     path = Path(path)

@@ -46,7 +46,7 @@ _LEAF_LIST = re.compile(r'\[\n[^\[\]{}"]*\]')
 _LEAF_OBJECT = re.compile(r"\{\n[^\[\]{}]*\}")
 
 
-def load_timeline(path: str | Path) -> Timeline:
+def load_timeline_json(path: str | Path) -> Timeline:
     """The performance in a timeline document.
 
     Raises:
@@ -66,7 +66,7 @@ def load_timeline(path: str | Path) -> Timeline:
 
 
 def save_timeline(path: str | Path, timeline: Timeline) -> None:
-    """Write a timeline document, whole or not at all; load_timeline gives the timeline back.
+    """Write a timeline document, whole or not at all; load_timeline_json gives the timeline back.
 
     Raises:
         InputError: a place that cannot be written.

@@ -69,7 +69,7 @@ COLUMNS = (
 )
 
 
-def write_openface(
+def save_openface(
     path: str | Path,
     track: Track,
     *,

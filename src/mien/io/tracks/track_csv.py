@@ -40,7 +40,7 @@ def columns_of(layout: Layout) -> tuple[str, ...]:
 
 
 def check_track_place(path: str | Path) -> None:
-    """Refuse, before any work is done, a name that write_track would not take.
+    """Refuse, before any work is done, a name that save_track would not take.
 
     Raises:
         InputError: another suffix than .csv; a TRACK.json beside it that is no track's, such as a
@@ -49,7 +49,7 @@ def check_track_place(path: str | Path) -> None:
     check_sidecar(sidecar_of(path))
 
 
-def write_track(path: str | Path, track: Track) -> None:
+def save_track(path: str | Path, track: Track) -> None:
     """Write TRACK.csv and TRACK.json, each whole or not at all; load_track gives the track back.
 
     Numbers keep 1e-10. A number that is not finite becomes an empty cell, and so do all of a lost

@@ -14,7 +14,7 @@ from mien.capture.video.frames_ahead import AHEAD, read_ahead
 from mien.capture.video.video import Frame, Video
 from mien.errors import InputError
 from mien.head import Head
-from mien.io.files.video import write_video
+from mien.io.files.video import save_video
 from mien.progress import StepProgress, no_step_progress
 from mien.render.picture import GREY, HeadRenderer
 from mien.render.shade import over_background
@@ -69,7 +69,7 @@ def write_overlay(
             progress(done, len(counts))
 
     with read_ahead(decoded(video, track), AHEAD) as frames:
-        return write_video(path, shown(frames), fps)
+        return save_video(path, shown(frames), fps)
 
 
 def overlay_frames(

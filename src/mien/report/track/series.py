@@ -19,6 +19,7 @@ class Series:
 
     Attributes:
         numbers: (N,) of the frames.
+        times: (N,) seconds.
         status: (N,).
         rms: (N,) as TrackedFrame's.
         seen: (N,) as TrackedFrame's.
@@ -30,6 +31,7 @@ class Series:
     """
 
     numbers: Int[Array, " n"]
+    times: Float[Array, " n"]
     status: tuple[str, ...]
     rms: Float[Array, " n"]
     seen: Float[Array, " n"]
@@ -59,6 +61,7 @@ def series_of(track: Track) -> Series:
     lost = np.array([found.state is None for found in frames], bool)
     return Series(
         numbers=np.array([found.frame for found in frames], np.int64),
+        times=np.array([found.time for found in frames]),
         status=tuple(found.status for found in frames),
         rms=np.array([found.rms for found in frames]),
         seen=np.where(lost, np.nan, [found.seen for found in frames]),
