@@ -138,8 +138,8 @@ def test_nothing_given_is_not_the_current_folder(
 @pytest.mark.parametrize(
     ("index", "format", "kind"),
     [
-        ("head.json", HEAD_FORMAT, "a head folder"),
-        ("examples.json", EXAMPLES_FORMAT, "an example folder"),
+        ("head.json", HEAD_FORMAT.name, "a head folder"),
+        ("examples.json", EXAMPLES_FORMAT.name, "an example folder"),
     ],
 )
 def test_what_mien_made_is_no_source(tmp_path: Path, index: str, format: str, kind: str) -> None:
