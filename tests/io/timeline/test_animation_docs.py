@@ -13,7 +13,7 @@ import pytest
 from mien.animate.channels import REGIONS
 from mien.animate.layers import GENERATORS
 from mien.io.timeline.fap_table import PARAMETERS
-from mien.io.timeline.timeline_check import check_timeline
+from mien.io.timeline.timeline_file import check_timeline
 from mien.io.timeline.timeline_json import DEGREES, load_timeline_json
 
 REFERENCE = Path(__file__).parents[3] / "docs" / "reference"

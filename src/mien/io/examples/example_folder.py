@@ -27,7 +27,7 @@ from mien.io.examples.example_json import (
 )
 from mien.io.files.atomic import atomic_folder, check_folder_place
 from mien.io.files.image import encode_image, load_image
-from mien.io.files.leftovers import put_back
+from mien.io.files.leftovers import finish_replacement
 from mien.numeric.kernels.threads import side_by_side
 from mien.reading.names import is_inside, named_path
 from mien.reading.npz import ArrayFile
@@ -66,7 +66,7 @@ def save_examples(
     Raises:
         InputError: the place holds something else or cannot be written; a name that is no file's.
     """
-    with atomic_folder(folder, replaces=is_example_folder, stay=()) as temporary:
+    with atomic_folder(folder, replaces=is_example_folder, editable=()) as temporary:
         write_example_files(temporary, example_set, why=why)
 
 
@@ -150,7 +150,8 @@ def load_reasons(folder: str | Path) -> dict[str, str]:
 
 def _read_index(folder: Path) -> tuple[Path, dict[str, Any]]:
     path = folder / INDEX
-    put_back(folder)
+    if not folder.is_dir():
+        finish_replacement(folder)
     if not folder.is_dir():
         found = "a file" if folder.exists() else "nothing at that place"
         raise InputError(folder, "an example folder that `mien examples` made", found)

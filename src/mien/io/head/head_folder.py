@@ -18,7 +18,7 @@ from mien.errors import DocumentError, FileFormatError, InputError
 from mien.head import NEUTRAL, Expression, Head
 from mien.io.files.atomic import atomic_folder, check_folder_place
 from mien.io.files.image import encode_image, load_image
-from mien.io.files.leftovers import put_back
+from mien.io.files.leftovers import finish_replacement
 from mien.io.head.head_geometry import check_names, load_geometry
 from mien.io.head.head_json import (
     HEAD_FORMAT,
@@ -77,7 +77,7 @@ def head_place(
     Raises:
         InputError: as save_head.
     """
-    return atomic_folder(folder, replaces=is_head_folder, read=read, stay=MASK_FILES)
+    return atomic_folder(folder, replaces=is_head_folder, read=read, editable=MASK_FILES)
 
 
 def write_head(
@@ -120,9 +120,14 @@ def load_head(folder: str | Path) -> Head:
             names the file and the place in it.
     """
     folder = named_path("head", folder, "a head folder that `mien build` made")
-    put_back(folder)
     if not folder.is_dir():
-        raise InputError(folder, "a head folder that `mien build` made", _what_is(folder))
+        finish_replacement(folder)
+    if not folder.is_dir():
+        raise InputError(
+            folder,
+            "a head folder that `mien build` made",
+            "a file" if folder.exists() else "nothing at that place",
+        )
     path = folder / HEAD
     if not path.exists():
         raise FileFormatError(path, "there is no such file; is this a head folder?")
@@ -239,7 +244,3 @@ def _write_photo(folder: Path, name: str, pixels: UInt8[Array, "h w 3"]) -> str:
 def _write_json(path: Path, data: Json) -> None:
     text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8")
-
-
-def _what_is(folder: Path) -> str:
-    return "a file" if folder.exists() else "nothing at that place"
