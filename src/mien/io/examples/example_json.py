@@ -1,4 +1,4 @@
-"""`examples.json`: everything about examples that is no picture and no statistics."""
+"""`examples.json`: everything about examples that is neither pictures nor statistics."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ STATISTICS = "statistics.npz"
 
 
 def photo_file(example: Example) -> str:
-    """Where in the folder its photo lies."""
+    """Path of an example's photo within the folder."""
     return f"photos/{example.name}.png"
 
 
@@ -104,14 +104,14 @@ def points_from_json(
 
 
 def index_of(name: object, place: str, names: list[str]) -> int:
-    """Which example bears a name. Raises: DocumentError: none; suggests the nearest."""
+    """Index of the example of a name. Raises: DocumentError: none; suggests the nearest."""
     if as_text(name, place) not in names:
         raise DocumentError(place, unknown("example", str(name), names))
     return names.index(str(name))
 
 
 def photo_from_json(data: Mapping[str, Any], place: str) -> str:
-    """Where an example's photo is, within the folder. Raises: DocumentError: it is not."""
+    """Path of an example's photo within the folder. Raises: DocumentError: one outside of it."""
     file = as_text(need(data, "photo", place), f"{place}.photo")
     if not is_inside(file):
         raise DocumentError(

@@ -88,7 +88,7 @@ def texts_from_json(data: Json, key: str, place: str = "") -> dict[str, str]:
 
 
 def texture_paths(data: Json) -> dict[str, str]:
-    """Where in the folder each texture is. Raises: DocumentError: a path that leaves it."""
+    """Path of each texture within the folder. Raises: DocumentError: one outside of it."""
     files = texts_from_json(data, "textures")
     for name, path in files.items():
         if not is_inside(path):

@@ -86,10 +86,10 @@ def _points(
     rows = as_object(need(data, "points", ""), "points")
     if not rows:
         raise DocumentError("points", "expected at least one point, found none")
-    return {name: _place(name, row, layout, axes) for name, row in rows.items()}
+    return {name: _point(name, row, layout, axes) for name, row in rows.items()}
 
 
-def _place(name: str, row: object, layout: FeatureLayout, axes: int) -> Float[Array, " d"]:
+def _point(name: str, row: object, layout: FeatureLayout, axes: int) -> Float[Array, " d"]:
     place = join("points", name)
     if name not in layout.names:
         raise DocumentError(place, unknown("point", name, layout.names))

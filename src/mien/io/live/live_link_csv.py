@@ -64,8 +64,8 @@ def save_live_link(
     Args:
         path: the file.
         moments: in rising time, from 0 s on.
-        units_of: the units that stand for a face; for a caller who can explain its photographed
-            expressions in units.
+        units_of: the units that stand for a face; for a caller that has units for its photographed
+            expressions.
 
     Returns:
         how many frames were written.

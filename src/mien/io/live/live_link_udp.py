@@ -104,19 +104,19 @@ def decode(data: bytes) -> Packet:
 
 @dataclass
 class _Reader:
-    """Bytes from their beginning to their end."""
+    """Reads bytes one after the other."""
 
     data: bytes
-    place: int = 0
+    position: int = 0
 
     @property
     def rest(self) -> bytes:
-        return self.data[self.place :]
+        return self.data[self.position :]
 
     def take(self, length: int) -> bytes:
         part = self.rest[:length]
         self.check(len(part) == length, f"{length} bytes", len(part))
-        self.place += length
+        self.position += length
         return part
 
     def text(self) -> str:
@@ -124,9 +124,9 @@ class _Reader:
         self.check(0 <= length <= _MAX_NAME, f"a text of at most {_MAX_NAME} bytes", length)
         return self.take(length).decode(errors="replace")
 
-    def check(self, fine: bool, expected: str, found: object) -> None:
-        if not fine:
-            raise InputError(f"Live Link packet at byte {self.place}", expected, found)
+    def check(self, valid: bool, expected: str, found: object) -> None:
+        if not valid:
+            raise InputError(f"Live Link packet at byte {self.position}", expected, found)
 
 
 def _text(name: str, text: str) -> bytes:

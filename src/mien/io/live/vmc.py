@@ -27,7 +27,7 @@ VMC_PORT = 39539
 
 _LOADED, _CALIBRATED, _NORMAL_MODE = 1, 3, 0
 _EYES = ("LeftEye", "RightEye")
-_PLACE = (0.0, 0.0, 0.0)
+_POSITION = (0.0, 0.0, 0.0)
 
 _Message = tuple[str, tuple[str | int | float, ...]]
 
@@ -71,7 +71,7 @@ def _status(seconds: float, *, tracked: bool) -> Iterator[_Message]:
 def _bones(moment: Moment) -> Iterator[_Message]:
     eye = unity_quaternion(_eye_rotation(moment.state.gaze))
     for bone, turn in (("Head", unity_quaternion(moment.rotation)), *((e, eye) for e in _EYES)):
-        yield "/VMC/Ext/Bone/Pos", (bone, *_PLACE, *turn)
+        yield "/VMC/Ext/Bone/Pos", (bone, *_POSITION, *turn)
 
 
 def _eye_rotation(gaze: Gaze) -> Array:

@@ -18,7 +18,7 @@ from mien.animate.layers import GENERATORS, Generator
 from mien.animate.timeline import PIVOT_MM, Clip, Layer, Placement, Timeline, Tracks
 from mien.errors import DocumentError, InputError
 from mien.io.files.atomic import atomic_file
-from mien.io.timeline.timeline_curves import curve_from_json, curve_to_json, tidy
+from mien.io.timeline.timeline_curves import curve_from_json, curve_to_json, rounded
 from mien.limits import MAX_FPS, MAX_SECONDS, MAX_SIDE, MIN_FPS
 from mien.reading.strict_json import (
     DocumentFormat,
@@ -39,8 +39,8 @@ TIMELINE_FORMAT = DocumentFormat("mien timeline", 1)
 _MOTION = ("tracks", "play")
 _TOP = ("format", "version", "duration", "fps", "size", "pivot", *_MOTION, "clips", "layers")
 _PLACEMENT = ("clip", "at", "speed", "weight", "repeats")
-# Parameters of generators that are angles: degrees in the file.
 DEGREES = frozenset(("tip", "sway"))
+"""Parameters of generators that are angles: degrees in the file."""
 
 _LEAF_LIST = re.compile(r'\[\n[^\[\]{}"]*\]')
 _LEAF_OBJECT = re.compile(r"\{\n[^\[\]{}]*\}")
@@ -61,13 +61,13 @@ def load_timeline_json(path: str | Path) -> Timeline:
 
 
 def save_timeline(path: str | Path, timeline: Timeline) -> None:
-    """Write a timeline document, whole or not at all; load_timeline_json gives the timeline back.
+    """Write a timeline document, whole or not at all; load_timeline gives the timeline back.
 
     Raises:
         InputError: a place that cannot be written.
     """
     text = json.dumps(timeline_to_json(timeline), indent=2, ensure_ascii=False, allow_nan=False)
-    # One key, one clip that is played, one pair of numbers: a line each.
+    # A key, a clip that is played, a pair of numbers are a line each.
     for inner in (_LEAF_LIST, _LEAF_OBJECT):
         text = inner.sub(lambda match: " ".join(match.group().split()), text)
     with atomic_file(path) as temporary:
@@ -191,14 +191,15 @@ def _generator(kind: str, given: dict[str, Any], place: str) -> Generator:
 def timeline_to_json(timeline: Timeline) -> dict[str, Any]:
     """The contents of the document that describes this timeline."""
     data = TIMELINE_FORMAT.header
-    data |= {"duration": tidy(timeline.duration), "fps": tidy(timeline.fps)}
+    data |= {"duration": rounded(timeline.duration), "fps": rounded(timeline.fps)}
     if timeline.size is not None:
         data["size"] = list(timeline.size)
-    data["pivot"] = [tidy(value) for value in timeline.pivot]
+    data["pivot"] = [rounded(value) for value in timeline.pivot]
     data |= _motion_to_json(timeline.tracks, timeline.placements)
     if timeline.clips:
         data["clips"] = {
-            name: {"duration": tidy(clip.duration)} | _motion_to_json(clip.tracks, clip.placements)
+            name: {"duration": rounded(clip.duration)}
+            | _motion_to_json(clip.tracks, clip.placements)
             for name, clip in timeline.clips.items()
         }
     if timeline.layers:
@@ -217,7 +218,7 @@ def _motion_to_json(tracks: Tracks, placements: tuple[Placement, ...]) -> dict[s
         data["tracks"] = groups
     if placements:
         data["play"] = [
-            {key: value if key == "clip" else tidy(value) for key, value in asdict(item).items()}
+            {key: value if key == "clip" else rounded(value) for key, value in asdict(item).items()}
             for item in placements
         ]
     return data
@@ -230,5 +231,5 @@ def _layer_to_json(layer: Layer) -> dict[str, Any]:
         data["generator"] = kinds[type(layer.generator)]
         for name, value in asdict(layer.generator).items():
             factor = 180 / math.pi if name in DEGREES else 1
-            data[name] = value if name == "seed" else tidy(value * factor)
+            data[name] = value if name == "seed" else rounded(value * factor)
     return data | _motion_to_json(layer.tracks, layer.placements)
