@@ -145,7 +145,7 @@ def save_example_folder(
     check_example_place(folder, read=[source])
     gathered = _gather(source, kind, request, None, report)
     report(WRITING, 0, 0)
-    with atomic_folder(folder, replaces=is_example_folder, read=[source], stay=()) as temporary:
+    with atomic_folder(folder, replaces=is_example_folder, read=[source], editable=()) as temporary:
         write_example_files(temporary, gathered.examples, why=gathered.why)
         sheet = example_sheet(gathered.examples, gathered.why)
         (temporary / "examples.jpg").write_bytes(encode_image(sheet, "JPEG", quality=92))

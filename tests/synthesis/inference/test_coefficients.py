@@ -57,7 +57,7 @@ def test_an_examples_own_points_give_it_alone(example_set, row):
     np.testing.assert_allclose(shares, np.tile(np.eye(5)[row], (2, 1)), atol=1e-5)
 
 
-def test_a_mix_within_the_hull_is_found(example_set):
+def test_a_mixture_within_the_hull_is_found(example_set):
     truth = np.array([0.4, 0.3, 0.0, 0.2, 0.1])
     points = np.einsum("m,mnd->nd", truth, example_set.geometries)
     shares = coefficients(example_set, MOVED(points), distance_penalty=0.0)
@@ -65,7 +65,7 @@ def test_a_mix_within_the_hull_is_found(example_set):
     np.testing.assert_allclose(hull_distances(example_set, MOVED(points)), 0, atol=1e-2)
 
 
-def test_shares_are_a_partition(example_set, rng):
+def test_coefficients_sum_to_one(example_set, rng):
     points = example_set.neutral.points + 9 * rng.normal(size=example_set.neutral.points.shape)
     shares = coefficients(example_set, points)
     np.testing.assert_allclose(shares.sum(axis=1), 1, atol=1e-9)

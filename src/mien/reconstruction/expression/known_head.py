@@ -68,7 +68,7 @@ def feature_sightings(features: Features, known: KnownHead) -> Sightings:
 def _beside(features: Features, known: KnownHead) -> Float[Array, "n 3"]:
     """(N, 3) mm, by which the neutral photos show each landmark off its place, on average."""
     seen = gather_features(known.views, known.generic)
-    column_of = {name: column for column, name in enumerate(seen.names)}
+    column_name = {name: column for column, name in enumerate(seen.names)}
     total, weight = np.zeros((len(seen.names), 3)), np.zeros(len(seen.names))
     places = seen.on(known.vertices)
     for k, camera in enumerate(known.cameras):
@@ -82,6 +82,6 @@ def _beside(features: Features, known: KnownHead) -> Float[Array, "n 3"]:
     mean = total / (weight + _HALF_BELIEVED)[:, None]
     beside = np.zeros((len(features.names), 3))
     for n, name in enumerate(features.names):
-        if name in column_of:
-            beside[n] = mean[column_of[name]]
+        if name in column_name:
+            beside[n] = mean[column_name[name]]
     return beside
