@@ -63,7 +63,7 @@ class EstimationError(MienError):
     """The data cannot answer the question, whoever asks; the message says why."""
 
 
-class Broken(Exception):
+class DocumentError(Exception):
     """Something else than expected at a place of a document; whoever reads the file names it."""
 
     def __init__(self, place: str, problem: str) -> None:

@@ -9,7 +9,7 @@ from mien.animate.perform import frames_of
 from mien.animate.sample import SAMPLE_TIMELINE
 from mien.animate.timeline import Timeline
 from mien.assets.generic import load_generic_head
-from mien.io.timeline.timeline_check import check_timeline
+from mien.io.timeline.timeline_file import check_timeline
 from mien.io.timeline.timeline_json import load_timeline_json
 
 

@@ -29,7 +29,7 @@ from mien.io.examples.example_folder import load_examples, load_reasons, save_ex
 from mien.io.files.image import encode_image, load_image
 from mien.io.head.head_folder import load_head, save_head
 from mien.io.landmarks.points_file import load_feature_points, save_feature_points
-from mien.io.live.live_link import save_live_link
+from mien.io.live.live_link_csv import save_live_link
 from mien.io.timeline.timeline_file import load_timeline
 from mien.io.tracks.track_csv import save_track
 from mien.io.tracks.track_journal import Journal, load_journal

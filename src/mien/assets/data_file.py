@@ -6,14 +6,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from mien.errors import Broken, FileFormatError
+from mien.errors import DocumentError, FileFormatError
 from mien.reading import strict_json
 from mien.reading.strict_json import (
+    DocumentFormat,
     as_list,
     as_number,
     as_object,
     as_text,
-    check_format,
     join,
     read_json,
 )
@@ -38,14 +38,14 @@ def read_data(path: Path, format_name: str, build: Callable[[dict[str, Any]], _K
     """
     document = read_json(path)
     try:
-        check_format(document, format_name, VERSION)
+        DocumentFormat(format_name, VERSION).check(document)
         return build(document)
-    except Broken as broken:
+    except DocumentError as broken:
         raise FileFormatError(path, broken.problem, broken.place) from None
 
 
 def need(data: Any, key: str, kind: type[_Kind], place: str = "") -> _Kind:
-    """data[key], of this kind. Raises: Broken."""
+    """data[key], of this kind. Raises: DocumentError."""
     entry = strict_json.need(as_object(data, place), key, place)
     return _READERS[kind](entry, join(place, key))
 
@@ -53,14 +53,14 @@ def need(data: Any, key: str, kind: type[_Kind], place: str = "") -> _Kind:
 def shares(
     data: dict[str, Any], index: Callable[[str], int | None], place: str
 ) -> dict[int, float]:
-    """Shares that sum to 1, by the index that each name stands for. Raises: Broken."""
+    """Shares that sum to 1, by the index that each name stands for. Raises: DocumentError."""
     found: dict[int, float] = {}
     for name, share in data.items():
         number = index(name)
         if number is None:
-            raise Broken(place, f"unknown point {name[:40]!r}")
+            raise DocumentError(place, f"unknown point {name[:40]!r}")
         # A share may lie outside of the hull.
         found[number] = as_number(share, place, least=-_LARGEST_SHARE, most=_LARGEST_SHARE)
     if not abs(sum(found.values()) - 1) < 1e-6:
-        raise Broken(place, f"expected shares that sum to 1, found {sum(found.values()):g}")
+        raise DocumentError(place, f"expected shares that sum to 1, found {sum(found.values()):g}")
     return found

@@ -13,8 +13,8 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array, frozen
 from mien.assets.data_file import need, read_data, shares
-from mien.errors import Broken, InputError
-from mien.numeric.planar_similarity import estimate_planar_motion
+from mien.errors import DocumentError, InputError
+from mien.numeric.planar_similarity import estimate_planar_similarity
 
 __all__ = ["FeatureLayout", "load_feature_layout"]
 
@@ -97,7 +97,7 @@ class FeatureLayout:
             [Zhang 2006] section 12, eq. (8) and (9), over the rigid points.
         """
         points = check_array("points", points, (len(self.names), 2))
-        motion = estimate_planar_motion(self.template[self.rigid], points[self.rigid])
+        motion = estimate_planar_similarity(self.template[self.rigid], points[self.rigid])
         return motion(self.surround)
 
 
@@ -117,7 +117,7 @@ def _layout(document: dict[str, Any]) -> FeatureLayout:
     names = tuple(need(p, "name", str, f"points[{i}]") for i, p in enumerate(points))
     for name in names:
         if names.count(name) > 1:
-            raise Broken("points", f"{name!r} appears twice")
+            raise DocumentError("points", f"{name!r} appears twice")
     surround = _places(need(document, "frame", list), "frame")
     sets = _sets(need(document, "sets", list), names)
     return FeatureLayout(
@@ -137,10 +137,10 @@ def _layout(document: dict[str, Any]) -> FeatureLayout:
 def _indices(members: Any, names: tuple[str, ...], place: str) -> Int[Array, " s"]:
     """The points of these names."""
     if not isinstance(members, list) or not members:
-        raise Broken(place, "expected a list of points")
+        raise DocumentError(place, "expected a list of points")
     for member in members:
         if member not in names:
-            raise Broken(place, f"unknown point {str(member)[:40]!r}")
+            raise DocumentError(place, f"unknown point {str(member)[:40]!r}")
     return frozen(np.array([names.index(member) for member in members]))
 
 
@@ -149,23 +149,25 @@ def _sets(levels: list[Any], names: tuple[str, ...]) -> list[dict[str, Int[Array
     found = []
     for number, level in enumerate(levels):
         if not isinstance(level, dict):
-            raise Broken(f"sets[{number}]", "expected an object of lists of points")
+            raise DocumentError(f"sets[{number}]", "expected an object of lists of points")
         found.append({k: _indices(v, names, f"sets[{number}].{k}") for k, v in level.items()})
     for number, level in enumerate(found):
         for name, members in level.items():
             near = [s for other in found[max(number - 1, 0) : number] for s in other.values()]
             if number and not any(np.isin(members, other).any() for other in near):
-                raise Broken(f"sets[{number}].{name}", "shares no point with the level above")
+                raise DocumentError(
+                    f"sets[{number}].{name}", "shares no point with the level above"
+                )
     held = {int(i) for level in found for members in level.values() for i in members}
     if missing := [name for i, name in enumerate(names) if i not in held]:
-        raise Broken("sets", f"{missing[0]!r} belongs to none")
+        raise DocumentError("sets", f"{missing[0]!r} belongs to none")
     return found
 
 
 def _rigid(members: list[Any], names: tuple[str, ...]) -> Int[Array, " r"]:
     indices = _indices(members, names, "rigid")
     if len(indices) < 2:
-        raise Broken("rigid", "expected at least 2 points")
+        raise DocumentError("rigid", "expected at least 2 points")
     return indices
 
 
@@ -173,7 +175,7 @@ def _places(rows: list[Any], place: str) -> Float[Array, "n 2"]:
     try:
         return frozen(check_array(place, rows, (None, 2)))
     except InputError as error:
-        raise Broken(place, f"expected {error.expected}, found {error.got}") from None
+        raise DocumentError(place, f"expected {error.expected}, found {error.got}") from None
 
 
 def _mirror(points: list[Any], names: tuple[str, ...]) -> Int[Array, " n"]:
@@ -182,14 +184,14 @@ def _mirror(points: list[Any], names: tuple[str, ...]) -> Int[Array, " n"]:
     for index, name in enumerate(names):
         if mirror[mirror[index]] != index:
             problem = f"its counterpart {partners[index]!r} has another one"
-            raise Broken(f"{name}.mirror", problem)
+            raise DocumentError(f"{name}.mirror", problem)
     return mirror
 
 
 def _triangles(rows: list[Any], count: int) -> Int[Array, "t 3"]:
     triangles = np.array(rows) if all(_is_triple(row) for row in rows) else None
     if triangles is None or not len(rows) or triangles.min() < 0 or triangles.max() >= count:
-        raise Broken("triangles", f"expected triples of whole numbers from 0 to {count - 1}")
+        raise DocumentError("triangles", f"expected triples of whole numbers from 0 to {count - 1}")
     return frozen(triangles)
 
 

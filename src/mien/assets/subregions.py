@@ -12,7 +12,7 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, Int, check_array, frozen
 from mien.assets.data_file import need, read_data, shares
 from mien.assets.feature_points import FeatureLayout
-from mien.errors import Broken, InputError
+from mien.errors import DocumentError, InputError
 from mien.reading.strict_json import as_number
 
 __all__ = ["SubregionDrawing", "Subregions", "default_subregions", "load_subregion_drawing"]
@@ -201,18 +201,18 @@ class _Region:
 def _drawing(document: dict[str, Any], layout: FeatureLayout) -> SubregionDrawing:
     if need(document, "layout", str) != layout.name:
         problem = f"expected {layout.name!r}, found {document['layout'][:40]!r}"
-        raise Broken("layout", problem)
+        raise DocumentError("layout", problem)
     blends = {k: _width(v, f"groups.{k}") for k, v in need(document, "groups", dict).items()}
     regions: dict[str, _Region] = {}
     for number, entry in enumerate(need(document, "regions", list)):
         name = need(entry, "name", str, f"regions[{number}]")
         if name in regions:
-            raise Broken(f"regions[{number}]", f"{name!r} appears twice")
+            raise DocumentError(f"regions[{number}]", f"{name!r} appears twice")
         regions[name] = region = _region(entry, name, regions, layout)
         if region.group not in blends:
-            raise Broken(f"{name}.group", f"unknown group {region.group[:40]!r}")
+            raise DocumentError(f"{name}.group", f"unknown group {region.group[:40]!r}")
     if not regions:
-        raise Broken("regions", "expected at least one")
+        raise DocumentError("regions", "expected at least one")
     return SubregionDrawing(
         names=tuple(regions),
         groups=tuple(region.group for region in regions.values()),
@@ -232,24 +232,26 @@ def _region(
         return _Region(group, _polygon(entry, name, layout), np.array(also, dtype=np.intp))
     original = before.get(need(entry, "mirror_of", str, name))
     if original is None:
-        raise Broken(f"{name}.mirror_of", f"no subregion {entry['mirror_of']!r} before this one")
+        raise DocumentError(
+            f"{name}.mirror_of", f"no subregion {entry['mirror_of']!r} before this one"
+        )
     group = need(entry, "group", str, name) if "group" in entry else original.group
     return _Region(group, _mirrored(original.corners, layout), layout.mirror[original.also])
 
 
 def _points(members: Any, place: str, layout: FeatureLayout) -> list[int]:
     if not isinstance(members, list):
-        raise Broken(place, "expected a list of points")
+        raise DocumentError(place, "expected a list of points")
     for member in members:
         if member not in layout.names:
-            raise Broken(place, f"unknown point {str(member)[:40]!r}")
+            raise DocumentError(place, f"unknown point {str(member)[:40]!r}")
     return [layout.index(member) for member in members]
 
 
 def _width(value: Any, place: str) -> float:
     number = as_number(value, place)
     if not 0 < number < 1:
-        raise Broken(place, f"expected a number between 0 and 1, found {number:g}")
+        raise DocumentError(place, f"expected a number between 0 and 1, found {number:g}")
     return number
 
 
@@ -261,13 +263,13 @@ def _polygon(region: Any, name: str, layout: FeatureLayout) -> Float[Array, "c p
     for number, (row, corner) in enumerate(zip(polygon, corners, strict=True)):
         place = f"{name}.corners[{number}]"
         if not isinstance(corner, dict):
-            raise Broken(place, "expected an object of shares by point")
+            raise DocumentError(place, "expected an object of shares by point")
         found = shares(corner, index.get, place)
         row[list(found)] = list(found.values())
     if region.get("symmetric"):
         polygon = np.vstack([polygon, _mirrored(polygon, layout)[::-1]])
     if len(polygon) < 3:
-        raise Broken(f"{name}.corners", f"expected at least 3, found {len(polygon)}")
+        raise DocumentError(f"{name}.corners", f"expected at least 3, found {len(polygon)}")
     return polygon
 
 

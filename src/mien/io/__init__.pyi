@@ -10,8 +10,8 @@ from mien.io.head.head_folder import load_head as load_head
 from mien.io.head.head_folder import save_head as save_head
 from mien.io.landmarks.points_file import load_feature_points as load_feature_points
 from mien.io.landmarks.points_file import save_feature_points as save_feature_points
-from mien.io.live.live_link import save_live_link as save_live_link
-from mien.io.live.live_link_read import load_live_link as load_live_link
+from mien.io.live.live_link_csv import load_live_link as load_live_link
+from mien.io.live.live_link_csv import save_live_link as save_live_link
 from mien.io.mesh.export import export_head as export_head
 from mien.io.timeline.timeline_file import load_timeline as load_timeline
 from mien.io.timeline.timeline_json import save_timeline as save_timeline

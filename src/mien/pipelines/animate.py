@@ -15,8 +15,7 @@ from mien.arrays import Array, UInt8
 from mien.errors import FileFormatError, InputError
 from mien.head import NEUTRAL, Head
 from mien.io.files.atomic import check_file_place, check_files_apart
-from mien.io.timeline.timeline_check import check_timeline
-from mien.io.timeline.timeline_file import load_timeline, timeline_files
+from mien.io.timeline.timeline_file import check_timeline, load_timeline, timeline_files
 from mien.pipelines.explained import units_of
 from mien.progress import Progress, StepProgress, no_progress, stage_progress
 from mien.render.picture import GREY, HeadRenderer
@@ -199,16 +198,16 @@ def _write_video(job: _Job, path: str | Path) -> int:
 
 
 def _write_model(job: _Job, path: str | Path) -> int:
+    from mien.io.mesh.animation_baking import bake_animation
     from mien.io.mesh.export import export_head
-    from mien.io.timeline.performance import performance
 
-    animation = performance(job.renderer.head, job.moments(), job.renderer.rig.evaluate)
+    animation = bake_animation(job.renderer.head, job.moments(), job.renderer.rig.evaluate)
     export_head(job.renderer.head, path, animation=animation)
     return len(animation.times)
 
 
 def _write_live_link(job: _Job, path: str | Path) -> int:
-    from mien.io.live.live_link import save_live_link
+    from mien.io.live.live_link_csv import save_live_link
 
     head = job.renderer.head
     return save_live_link(path, job.moments(), units_of=lambda state: units_of(head, state))

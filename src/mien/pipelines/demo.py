@@ -63,7 +63,7 @@ def run_demo(folder: Path, *, progress: Progress) -> Path:
         InputError: the folder holds something else or cannot be written.
     """
     check_folder_place(folder, replaces=_is_demo)
-    with atomic_folder(folder, replaces=_is_demo, stay=()) as temporary:
+    with atomic_folder(folder, replaces=_is_demo, editable=()) as temporary:
         head = build_head_folder(demo_photos(), temporary / "head", progress=progress).head
         pictures = _save_pictures(head, temporary, progress)
         export_head(head, temporary / "james.glb")

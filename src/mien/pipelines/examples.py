@@ -55,7 +55,7 @@ FINDING, FETCHING = "Finding the face", "Fetching the examples"
 DETECTING_AGAIN, WRITING = "Looking at them again", "Writing"
 COUNTED = (FINDING,)
 """Stages whose steps are pictures."""
-MAX_SIDE = 1200
+EXAMPLE_SIDE = 1200
 """px; larger photos are reduced to it: a face needs no more than some 600 px for its wrinkles."""
 
 
@@ -81,7 +81,7 @@ class ExampleRequest:
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     face: int | None = None
-    max_side: int = MAX_SIDE
+    max_side: int = EXAMPLE_SIDE
     even: bool = True
 
     def overrides(self, series: FaceSeries) -> SelectionOverrides:
@@ -145,7 +145,7 @@ def save_example_folder(
     check_example_place(folder, read=[source])
     gathered = _gather(source, kind, request, None, report)
     report(WRITING, 0, 0)
-    with atomic_folder(folder, replaces=is_example_folder, read=[source], stay=()) as temporary:
+    with atomic_folder(folder, replaces=is_example_folder, read=[source], editable=()) as temporary:
         write_example_files(temporary, gathered.examples, why=gathered.why)
         sheet = example_sheet(gathered.examples, gathered.why)
         (temporary / "examples.jpg").write_bytes(encode_image(sheet, "JPEG", quality=92))

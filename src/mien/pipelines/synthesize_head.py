@@ -12,7 +12,7 @@ from mien.assets.feature_points import FeatureLayout
 from mien.capture.images.photos import load_photo
 from mien.errors import InputError
 from mien.head import Head
-from mien.io.examples.weights_json import save_shares
+from mien.io.examples.weights_json import save_coefficients
 from mien.io.files.image import save_image
 from mien.io.head.head_folder import load_head
 from mien.io.landmarks.points_json import load_points_json
@@ -197,7 +197,7 @@ def _write_weights(
 ) -> None:
     names = synthesizer.rig.names
     photos = [", ".join(view.photo for view in head.expressions[name].views) for name in names]
-    save_shares(
+    save_coefficients(
         path,
         layout=synthesizer.layout.name,
         sources=dict(zip(names, photos, strict=True)),

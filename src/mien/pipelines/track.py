@@ -27,7 +27,7 @@ from mien.track.smoothing import smooth
 from mien.track.state import STATUSES, Status, Track
 from mien.track.tracker import TrackOptions
 
-MAX_SIDE = 1920
+TRACKING_SIDE = 1920
 """px; larger pictures are tracked reduced to it. Reducing smaller ones would take longer than it
 saves: a face is compared at a size of its own anyway."""
 COUNTED = (LENS, TRACKING, OVERLAY)
@@ -79,7 +79,7 @@ def track_video(
     smooth_seconds: float | None = None,
     resume: bool = False,
     options: TrackOptions | None = None,
-    max_side: int = MAX_SIDE,
+    max_side: int = TRACKING_SIDE,
     progress: Progress | None = None,
 ) -> Tracked:
     """Track a head through a video and write what was found, each file whole or not at all.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import stat
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from mien.errors import FileFormatError, InputError
 
@@ -70,6 +70,13 @@ def check_readable(path: Path, kind: str) -> None:
         raise InputError(path, f"{kind} that can be read", error.strerror or error) from None
     if empty:
         raise FileFormatError(path, f"expected {kind}, found an empty file")
+
+
+def is_inside(path: str) -> bool:
+    """Whether a relative path, with forward slashes, leads to somewhere below its folder."""
+    plain = PurePosixPath(path)
+    inside = bool(path) and not plain.is_absolute() and ".." not in plain.parts
+    return inside and not set(path) & set("\\\0")
 
 
 def plain_name(path: Path) -> str:

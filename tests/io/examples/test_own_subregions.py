@@ -15,7 +15,7 @@ from mien.io.examples.example_folder import load_examples, save_examples
 from mien.synthesis.examples.example_set import Example, ExampleSet
 from mien.synthesis.synthesizer import Synthesizer
 
-PAGE = Path(__file__).parents[3] / "docs" / "reference" / "feature-points.md"
+PAGE = Path(__file__).parents[3] / "docs" / "guide" / "subregions.md"
 SIZE = (160, 200)
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from mien.io.files import leftovers
 from mien.io.files.atomic import atomic_file, atomic_folder
-from mien.io.files.leftovers import DAYS_OF_OTHERS, put_back, temporary_beside
+from mien.io.files.leftovers import FOREIGN_RUN_DAYS, finish_replacement, temporary_beside
 from mien.io.head.head_folder import load_head
 
 KILLED = """
@@ -91,9 +91,9 @@ def test_of_two_the_one_in_place_counts(tmp_path: Path) -> None:
         folder.mkdir()
     (tmp_path / "head" / "new").write_text("")
     leftovers._own.clear()
-    put_back(tmp_path / "other")
+    finish_replacement(tmp_path / "other")
     assert aside.exists(), "another folder's"
-    put_back(tmp_path / "head")
+    finish_replacement(tmp_path / "head")
     assert names(tmp_path) == ["head"]
     assert names(tmp_path / "head") == ["new"]
 
@@ -125,7 +125,7 @@ def test_of_other_machines_after_a_day(tmp_path: Path) -> None:
     new, old = (tmp_path / f".mien-{target}-00000000-{pid}-0000000{i}.tmp" for i in (1, 2))
     for path in (new, old):
         path.write_text("half")
-    past = time.time() - 1.1 * DAYS_OF_OTHERS * 86_400
+    past = time.time() - 1.1 * FOREIGN_RUN_DAYS * 86_400
     os.utime(old, (past, past))
     with atomic_file(tmp_path / "y"):
         assert new.exists()

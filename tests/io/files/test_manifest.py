@@ -11,15 +11,15 @@ import pytest
 from mien.errors import InputError
 from mien.io.files import atomic
 from mien.io.files.atomic import atomic_folder, check_files_apart, check_side_file
-from mien.io.files.manifest import MANIFEST, kept_notes, load_manifest, own_files
+from mien.io.files.manifest import MANIFEST, kept_notes, load_manifest, user_files
 
 
 def always(folder: Path) -> bool:
     return True
 
 
-def write(folder: Path, files: Mapping[str, str], stay: tuple[str, ...] = ()) -> None:
-    with atomic_folder(folder, replaces=always, stay=stay) as place:
+def write(folder: Path, files: Mapping[str, str], editable: tuple[str, ...] = ()) -> None:
+    with atomic_folder(folder, replaces=always, editable=editable) as place:
         for name, text in files.items():
             (place / name).parent.mkdir(parents=True, exist_ok=True)
             (place / name).write_text(text)
@@ -40,7 +40,7 @@ def test_all_of_a_new_folder_is_miens(place: Path) -> None:
     manifest = load_manifest(place)
     assert manifest is not None
     assert set(manifest.files) == {"a", "deep/b", "old"}
-    assert own_files(place) == []
+    assert user_files(place) == []
     assert kept_notes(place) == ()
 
 
@@ -195,7 +195,7 @@ def test_empty_folders_stay(place: Path) -> None:
 def test_what_people_are_meant_to_change_stays(place: Path) -> None:
     (place / "a").write_text("painted")
     for _ in range(2):
-        write(place, {"a": "1", "deep/b": "2"}, stay=("a",))
+        write(place, {"a": "1", "deep/b": "2"}, editable=("a",))
         assert contents(place) == {"a": "painted", "deep/b": "2"}
 
 
@@ -228,7 +228,7 @@ def test_a_failure_leaves_all_as_it_was(place: Path) -> None:
     before = contents(place)
 
     def fail() -> None:
-        with atomic_folder(place, replaces=always, stay=()) as new:
+        with atomic_folder(place, replaces=always, editable=()) as new:
             (new / "a").write_text("half")
             raise RuntimeError
 

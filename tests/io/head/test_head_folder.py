@@ -15,7 +15,7 @@ from documents import put
 from mien.errors import FileFormatError, InputError
 from mien.head import SHADING, Head
 from mien.io.head.head_folder import check_head_place, load_head, save_head
-from mien.io.head.head_json import VERSION
+from mien.io.head.head_json import HEAD_FORMAT
 
 JOY = ("expressions", "joy", "cameras", 0)
 
@@ -246,7 +246,9 @@ def test_a_folder_with_some_other_head_json_is_never_replaced(
 
 
 def test_a_newer_head_is_refused_and_says_so(saved: Path) -> None:
-    edit_json(saved, lambda data: data.update(version=VERSION + 1, generator="mien 9.0"))
+    edit_json(
+        saved, lambda data: data.update(version=HEAD_FORMAT.version + 1, generator="mien 9.0")
+    )
     with pytest.raises(FileFormatError, match=r"head\.json: version: 2 .*newer mien \(mien 9.0\)"):
         load_head(saved)
     check_head_place(saved)  # but it is a head folder, so that a new build may replace it

@@ -1,4 +1,4 @@
-"""docs/reference/timeline.md says what the code does."""
+"""docs/reference/timeline.md and fap.md say what the code does."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ import pytest
 from mien.animate.channels import REGIONS
 from mien.animate.layers import GENERATORS
 from mien.io.timeline.fap_table import PARAMETERS
-from mien.io.timeline.timeline_check import check_timeline
+from mien.io.timeline.timeline_file import check_timeline
 from mien.io.timeline.timeline_json import DEGREES, load_timeline_json
 
-PAGE = (Path(__file__).parents[3] / "docs" / "reference" / "timeline.md").read_text(
-    encoding="utf-8"
-)
+REFERENCE = Path(__file__).parents[3] / "docs" / "reference"
+PAGE = "".join((REFERENCE / name).read_text("utf-8") for name in ("timeline.md", "fap.md"))
 
 
 def test_the_example_loads(tmp_path: Path) -> None:

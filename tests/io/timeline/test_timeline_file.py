@@ -12,7 +12,7 @@ from mien.animate.from_track import track_moments
 from mien.animate.perform import moments
 from mien.animate.timeline import Timeline
 from mien.errors import InputError
-from mien.io.live.live_link import save_live_link
+from mien.io.live.live_link_csv import save_live_link
 from mien.io.timeline.timeline_file import load_timeline
 from mien.io.timeline.timeline_json import save_timeline
 from mien.io.tracks.track_csv import save_track

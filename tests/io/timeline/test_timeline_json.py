@@ -13,7 +13,7 @@ from mien.animate.curves import Curve, constant
 from mien.animate.layers import Blink, Breathing
 from mien.animate.timeline import Clip, Layer, Placement, Timeline
 from mien.errors import FileFormatError, InputError
-from mien.io.timeline.timeline_check import check_timeline
+from mien.io.timeline.timeline_file import check_timeline
 from mien.io.timeline.timeline_json import load_timeline_json, save_timeline
 
 MIXED = Curve(

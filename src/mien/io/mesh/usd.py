@@ -17,9 +17,9 @@ from mien.errors import InputError
 from mien.head import Head
 from mien.io.files.atomic import atomic_file
 from mien.io.files.image import encode_image
+from mien.io.mesh.export_surface import ExportSurface, MorphTarget, export_surface
 from mien.io.mesh.head_animation import HeadAnimation
-from mien.io.mesh.surface import ExportSurface, MorphTarget, export_surface
-from mien.io.mesh.usd_materials import define_materials, free_name, integers, texture_files
+from mien.io.mesh.usd_materials import define_materials, free_name, integers, texture_file_names
 
 # USD's own default unit, and what programs assume that do not read the file's.
 _METRES_PER_UNIT = 0.01
@@ -46,6 +46,8 @@ def save_usdz(
     their own make a variant set of the head, "texture": one is chosen, none are mixed.
 
     Args:
+        head: the head.
+        path: the file.
         parts: names of parts; by default all but the hair cap and the lashes.
         units: with the face units.
         animation: how the head moves.
@@ -63,7 +65,7 @@ def save_usdz(
     with TemporaryDirectory(prefix="mien-usd-") as folder:
         layer = Path(folder, "head.usdc")
         stage = Usd.Stage.CreateNew(str(layer))
-        files = texture_files(surface)
+        files = texture_file_names(surface)
         _fill_stage(stage, surface, head, files)
         if animation is not None:
             _animate(stage, animation, [target.name for target in surface.targets])

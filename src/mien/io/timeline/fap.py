@@ -151,6 +151,7 @@ def save_fap(
     parameters follow, and one with the frame's number and their values.
 
     Args:
+        path: the file.
         values: (68,) a frame, as FapMeter.read gives them.
         fps: frames a second; the format knows whole numbers only.
         name: of the performance; the file's own unless given.
@@ -167,10 +168,10 @@ def save_fap(
     title = "_".join(escaped(name or Path(path).stem).split()) or "mien"
     mask = " ".join("1" if number in MEASURED else "0" for number in range(1, COUNT + 1))
     chosen, count = np.array(sorted(MEASURED)) - 1, 0
-    # The first line tells how many follow, which is known at the end.
+    # The first line holds the count, which is known at the end.
     with TemporaryFile("w+", encoding="utf-8", newline="\n") as body:
-        for count, values_now in enumerate(values, 1):
-            row = check_array(f"frame {count - 1}", values_now, (COUNT,), dtype=int)
+        for count, frame_values in enumerate(values, 1):
+            row = check_array(f"frame {count - 1}", frame_values, (COUNT,), dtype=int)
             body.write(f"{mask}\n{' '.join(map(str, [count - 1, *row[chosen].tolist()]))}\n")
         if not count:
             raise InputError(path, "at least one frame to write", "none")
@@ -198,8 +199,8 @@ def _weights(point: str) -> tuple[tuple[int, ...], Array]:
         return tuple(corners.tolist()), generic.landmark_barycentrics[int(index)]
     if kind == "tongue_tip":
         tongue = _part("tongue")
-        foremost = mesh.vertices[tongue, 2]
-        near = tongue[foremost > foremost.max() - 1.0]
+        depth = mesh.vertices[tongue, 2]
+        near = tongue[depth > depth.max() - 1.0]
         return tuple(near.tolist()), np.full(len(near), 1 / len(near))
     return (generic.vertex_of(point),), np.ones(1)
 

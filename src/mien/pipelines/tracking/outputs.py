@@ -14,7 +14,7 @@ from mien.errors import InputError
 from mien.head import Head
 from mien.io.files.atomic import check_file_place, check_files_apart
 from mien.io.files.video import check_video_place
-from mien.io.live.live_link import save_live_link
+from mien.io.live.live_link_csv import save_live_link
 from mien.io.tracks.openface_csv import save_openface
 from mien.io.tracks.track_csv import check_track_place, save_track
 from mien.io.tracks.track_journal import journal_of

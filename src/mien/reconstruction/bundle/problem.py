@@ -19,7 +19,7 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, Int
 from mien.camera import Camera
 from mien.numeric.rotation import rotation_from_vector, rotation_to_vector
-from mien.numeric.segment_sum import GroupSums
+from mien.numeric.segment_sum import SegmentSum
 from mien.numeric.solvers.schur import BlockSystem
 from mien.reconstruction.bundle.projection import (
     CAMERA_SIZE,
@@ -234,10 +234,10 @@ class BundleProblem:
         principal = np.stack([camera.principal for camera in cameras])
         self.image = observations.image_points - principal[observations.photo]
         count, photos = len(point_prior.mean), len(cameras)
-        self.sum_by_point = GroupSums(observations.point, count)
-        self.sum_by_photo = GroupSums(observations.photo, photos)
+        self.sum_by_point = SegmentSum(observations.point, count)
+        self.sum_by_photo = SegmentSum(observations.photo, photos)
         pair = observations.point * photos + observations.photo
-        self._sum_by_pair = GroupSums(pair, count * photos)
+        self._sum_by_pair = SegmentSum(pair, count * photos)
         # (3N, C): as one matrix, so that sums over points are single products.
         components = point_prior.components
         self.basis = np.ascontiguousarray(components.reshape(len(components), 3 * count).T)

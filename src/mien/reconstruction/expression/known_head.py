@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.reconstruction.features import EDGE_SIGMA_MM, Features, gather_features
 from mien.reconstruction.observations import SurfaceObservations
 
@@ -34,7 +34,7 @@ class KnownHead:
         units: (52, V, 3) mm, the face units of this head.
     """
 
-    views: Sequence[View]
+    views: Sequence[CapturedView]
     cameras: Sequence[Camera]
     vertices: Float[Array, "v 3"]
     units: Float[Array, "52 v 3"]
@@ -68,7 +68,7 @@ def feature_observations(features: Features, known: KnownHead) -> SurfaceObserva
 def _offset(features: Features, known: KnownHead) -> Float[Array, "n 3"]:
     """(N, 3) mm, by which the neutral photos show each landmark off its place, on average."""
     seen = gather_features(known.views, known.generic)
-    column_of = {name: column for column, name in enumerate(seen.names)}
+    column_name = {name: column for column, name in enumerate(seen.names)}
     total, weight = np.zeros((len(seen.names), 3)), np.zeros(len(seen.names))
     places = seen.on(known.vertices)
     for k, camera in enumerate(known.cameras):
@@ -82,6 +82,6 @@ def _offset(features: Features, known: KnownHead) -> Float[Array, "n 3"]:
     mean = total / (weight + _HALF_BELIEVED)[:, None]
     offset = np.zeros((len(features.names), 3))
     for n, name in enumerate(features.names):
-        if name in column_of:
-            offset[n] = mean[column_of[name]]
+        if name in column_name:
+            offset[n] = mean[column_name[name]]
     return offset

@@ -90,6 +90,7 @@ def export_surface(
     Triangles that touch a vertex twice are left out.
 
     Args:
+        head: the head.
         parts: names; by default those that pictures show, all but the hair cap and the lashes.
         units: with the face units.
         shapes: further morph targets: mm over the head's vertices.
@@ -98,7 +99,7 @@ def export_surface(
         InputError: an unknown part, nothing left to export, a further target with the name or
             without the shape of the others.
     """
-    offsets = target_offsets(head, units=units)
+    offsets = morph_offsets(head, units=units)
     for name, shape in (shapes or {}).items():
         if name in offsets:
             raise InputError("shapes", "names that no other target has", name)
@@ -123,16 +124,16 @@ def export_surface(
     )
 
 
-def target_offsets(head: Head, *, units: bool = True) -> dict[str, Float[Array, "v 3"]]:
+def morph_offsets(head: Head, *, units: bool = True) -> dict[str, Float[Array, "v 3"]]:
     """(V, 3) mm of each morph target: the face units, then the photographed expressions."""
     offsets = dict(zip(head.unit_names, head.units, strict=True)) if units else {}
     for name, expression in head.expressions.items():
         if name != NEUTRAL:
-            offsets[expression_target(head, name)] = expression.vertices - head.mesh.vertices
+            offsets[expression_target_name(head, name)] = expression.vertices - head.mesh.vertices
     return offsets
 
 
-def expression_target(head: Head, expression: str) -> str:
+def expression_target_name(head: Head, expression: str) -> str:
     """The name of an expression's morph target: its own, or NAME_photo where a unit has that."""
     return f"{expression}_photo" if expression in head.unit_names else expression
 

@@ -14,8 +14,8 @@ from mien.animate.perform import frames_of, moments
 from mien.animate.timeline import Timeline
 from mien.assets.generic import load_generic_head
 from mien.errors import FileFormatError, InputError
-from mien.io.live.live_link import UNITS, save_live_link, timecode
-from mien.io.live.live_link_read import load_live_link
+from mien.io.live.live_link import UNITS
+from mien.io.live.live_link_csv import load_live_link, save_live_link, timecode
 
 HEADER = (
     "Timecode,BlendShapeCount,EyeBlinkLeft,EyeLookDownLeft,EyeLookInLeft,EyeLookOutLeft,"

@@ -1,11 +1,16 @@
-"""Live Link Face CSV in: a recording as a timeline."""
+"""Live Link Face CSV: what the app records and plug-ins of Unreal, Blender and Maya read.
+
+A row a frame: timecode, how many numbers follow, 52 face units (`EyeBlinkLeft`), angles of head and
+eyes (mien.io.live.live_link).
+"""
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,22 +18,73 @@ import numpy as np
 
 from mien.animate.channels import head_angles
 from mien.animate.curves import MIN_STEP, Curve, sampled
-from mien.animate.timeline import Timeline
+from mien.animate.timeline import Moment, Timeline
 from mien.arrays import Array, Float
-from mien.errors import FileFormatError
-from mien.io.live.live_link import COUNT, HEAD_COLUMNS, TIMECODE, TIMECODE_RATE, UNITS
+from mien.errors import FileFormatError, InputError
+from mien.io.files.atomic import atomic_file
+from mien.io.live.live_link import (
+    EYE_COLUMNS,
+    HEAD_COLUMNS,
+    TIMECODE_RATE,
+    UNITS,
+    column_name,
+    live_link_values,
+)
 from mien.limits import MAX_FPS, MAX_FRAMES, MAX_GAP_SECONDS, MAX_SECONDS, MIN_FPS, UNIT_RANGE
 from mien.reading.csv_rows import finite_number, read_rows
+from mien.rig.state import FaceState
+
+TIMECODE_COLUMN, COUNT_COLUMN = "Timecode", "BlendShapeCount"
 
 _TIMECODE = re.compile(r"(\d{1,2}):(\d{2}):(\d{2})[:;](\d{1,3}(?:[.,]\d{1,9})?)", re.ASCII)
 _SEPARATORS = ",;\t"
 _OPTIONAL = frozenset(("tongueout",))
 _DAY = 24 * 3600
-_HEADER = f"a Live Link Face recording, whose first line starts with {TIMECODE},{COUNT}"
+_HEADER = (
+    f"a Live Link Face recording, whose first line starts with {TIMECODE_COLUMN},{COUNT_COLUMN}"
+)
 _SPARSE_SECONDS = 0.1
-"""Rows farther apart than this show no speech: the user is told."""
+"""Rows farther apart than this show no speech, which is worth a note."""
 _PERCENT, _DEGREES = 100.0, 360.0
 _TURN = 2 * math.pi
+
+
+def save_live_link(
+    path: str | Path,
+    moments: Iterable[Moment],
+    *,
+    units_of: Callable[[FaceState], Mapping[str, float]] = lambda state: state.units,
+) -> int:
+    """Write a performance as a Live Link Face CSV, whole or not at all.
+
+    The format knows no photographed expressions and no moved head: only units, head and eye
+    angles are written. Where the eyes look is added to the EyeLook units, which is what most
+    programs read.
+
+    Args:
+        path: the file.
+        moments: in rising time, from 0 s on.
+        units_of: the units that stand for a face; for a caller that has units for its photographed
+            expressions.
+
+    Returns:
+        how many frames were written.
+
+    Raises:
+        InputError: no moment, a unit that the format has no column for, a negative time, a place
+            that cannot be written.
+    """
+    count = 0
+    header = [TIMECODE_COLUMN, COUNT_COLUMN, *map(column_name, UNITS), *HEAD_COLUMNS, *EYE_COLUMNS]
+    with atomic_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        for moment in moments:
+            writer.writerow(_row(moment, units_of(moment.state)))
+            count += 1
+        if not count:
+            raise InputError(path, "at least one frame to write", "none")
+    return count
 
 
 def load_live_link(path: str | Path, *, timecode_rate: float | None = None) -> Timeline:
@@ -41,6 +97,7 @@ def load_live_link(path: str | Path, *, timecode_rate: float | None = None) -> T
     the first counts. The timeline's notes tell of these, and of rows that are far apart.
 
     Args:
+        path: the file.
         timecode_rate: frames a second that the timecodes count; found from where they start again
             unless given, and the app's 60 where they never do.
 
@@ -61,7 +118,7 @@ def load_live_link(path: str | Path, *, timecode_rate: float | None = None) -> T
         if _is_lost(row, columns):
             continue
         _check_width(path, line, row, len(header))
-        stamp = _stamp(path, line, _cell(row, columns[TIMECODE.lower()]))
+        stamp = _stamp(path, line, _cell(row, columns[TIMECODE_COLUMN.lower()]))
         if stamps and stamp == stamps[-1]:
             doubled += 1
             continue
@@ -78,6 +135,22 @@ def load_live_link(path: str | Path, *, timecode_rate: float | None = None) -> T
     return replace(timeline, notes=tuple(_notes(path, times, doubled)))
 
 
+def timecode(seconds: float) -> str:
+    """HH:MM:SS:FF.sss with TIMECODE_RATE frames a second. Raises: InputError: negative."""
+    if not seconds >= 0:
+        raise InputError("time", "a frame at 0 s or later", f"{seconds:g} s")
+    total, thousandths = divmod(round(seconds * TIMECODE_RATE * 1000), 1000)
+    whole, frame = divmod(total, TIMECODE_RATE)
+    hours, minutes = divmod(whole // 60, 60)
+    return f"{hours:02}:{minutes:02}:{whole % 60:02}:{frame:02}.{thousandths:03}"
+
+
+def _row(moment: Moment, given: Mapping[str, float]) -> list[str]:
+    # Adding 0 turns -0 into 0.
+    numbers = [f"{value + 0.0:.10f}" for value in live_link_values(moment, given).values()]
+    return [timecode(moment.time), str(len(numbers)), *numbers]
+
+
 def _notes(path: Path, times: Array, doubled: int) -> Iterator[str]:
     if doubled:
         rows = "a row repeats" if doubled == 1 else f"{doubled} rows repeat"
@@ -91,7 +164,7 @@ def _columns(path: Path, header: Sequence[str], line: int) -> dict[str, int]:
     """Where each column is, by its name in lower case."""
     place = f"line {line}"
     names = [name.strip().lower() for name in header]
-    if TIMECODE.lower() not in names:
+    if TIMECODE_COLUMN.lower() not in names:
         raise FileFormatError(path, f"expected {_HEADER}, found {','.join(header)[:40]!r}", place)
     counts = Counter(filter(None, names))
     for name, count in counts.items():
@@ -118,8 +191,8 @@ def _value_names(columns: dict[str, int]) -> tuple[str, ...]:
 
 def _is_lost(row: Sequence[str], columns: dict[str, int]) -> bool:
     """A frame in which the app saw no face: a count of 0, nothing after it."""
-    told = _cell(row, columns.get(COUNT.lower(), len(row)))
-    return told == "0" or (len(row) > 1 and not any(cell.strip() for cell in row[2:]))
+    count = _cell(row, columns.get(COUNT_COLUMN.lower(), len(row)))
+    return count == "0" or (len(row) > 1 and not any(cell.strip() for cell in row[2:]))
 
 
 def _cell(row: Sequence[str], index: int) -> str:
@@ -131,7 +204,7 @@ def _stamp(path: Path, line: int, text: str) -> tuple[int, float]:
     match = _TIMECODE.fullmatch(text)
     if match is None or int(match[2]) > 59 or int(match[3]) > 59:
         problem = f"expected HH:MM:SS:FF.sss, found {text[:40]!r}"
-        raise FileFormatError(path, problem, f"line {line}, {TIMECODE}")
+        raise FileFormatError(path, problem, f"line {line}, {TIMECODE_COLUMN}")
     seconds = (int(match[1]) * 60 + int(match[2])) * 60 + int(match[3])
     return seconds, float(match[4].replace(",", "."))
 
@@ -182,7 +255,7 @@ def _times(
     ):
         if len(found := np.flatnonzero(wrong)):
             index = int(found[0]) + 1
-            raise FileFormatError(path, problem, f"line {lines[index]}, {TIMECODE}")
+            raise FileFormatError(path, problem, f"line {lines[index]}, {TIMECODE_COLUMN}")
     return elapsed
 
 
@@ -202,13 +275,13 @@ def _timeline(times: Array, values: dict[str, Array]) -> Timeline:
 def _head_tracks(times: Array, angles: Sequence[Array | None]) -> dict[str, Curve]:
     from scipy.spatial.transform import Rotation
 
-    there = [angle for angle in angles if angle is not None]
-    if len(there) < len(angles) or not np.any(there):
+    given = [angle for angle in angles if angle is not None]
+    if len(given) < len(angles) or not np.any(given):
         return {}
-    turned = np.column_stack([-there[0], there[1], -there[2]])
-    rotations = Rotation.from_euler("YXZ", turned).as_matrix()
-    ours = np.unwrap(np.array([head_angles(rotation) for rotation in rotations]), axis=0)
+    yaw_pitch_roll = np.column_stack([-given[0], given[1], -given[2]])
+    rotations = Rotation.from_euler("YXZ", yaw_pitch_roll).as_matrix()
+    unwrapped = np.unwrap(np.array([head_angles(rotation) for rotation in rotations]), axis=0)
     return {
-        f"head.{name}": sampled(times, ours[:, index])
+        f"head.{name}": sampled(times, unwrapped[:, index])
         for index, name in enumerate(("yaw", "pitch", "roll"))
     }

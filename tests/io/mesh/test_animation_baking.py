@@ -11,9 +11,9 @@ from glb_file import Glb
 from mien.animate.timeline import Moment
 from mien.errors import InputError
 from mien.head import Head
+from mien.io.mesh.animation_baking import bake_animation
+from mien.io.mesh.export_surface import morph_offsets
 from mien.io.mesh.gltf import glb_bytes, save_glb
-from mien.io.mesh.surface import target_offsets
-from mien.io.timeline.performance import performance
 from mien.numeric.rotation import rotation_from_vector
 from mien.rig.state import FaceState, Gaze, PosedFace
 
@@ -62,7 +62,7 @@ def test_the_file_moves_as_the_rig_does(
     puppet: Puppet, tmp_path: Path, gltf_remarks: Callable[[Path], list[str]]
 ) -> None:
     moments = [moment(time) for time in TIMES]
-    animation = performance(puppet.head, moments, puppet.evaluate, tolerance_mm=0.01)
+    animation = bake_animation(puppet.head, moments, puppet.evaluate, tolerance_mm=0.01)
     save_glb(puppet.head, tmp_path / "head.glb", animation=animation)
     assert gltf_remarks(tmp_path / "head.glb") == []
     glb = Glb((tmp_path / "head.glb").read_bytes())
@@ -83,12 +83,12 @@ def test_a_long_performance_comes_in_batches(
     puppet: Puppet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     moments = [moment(time) for time in np.arange(40) / 24]
-    whole = performance(puppet.head, moments, puppet.evaluate)
-    monkeypatch.setattr("mien.io.timeline.performance._BATCH", 7)
-    parts = performance(puppet.head, iter(moments), puppet.evaluate)
+    whole = bake_animation(puppet.head, moments, puppet.evaluate)
+    monkeypatch.setattr("mien.io.mesh.animation_baking._BATCH", 7)
+    parts = bake_animation(puppet.head, iter(moments), puppet.evaluate)
     assert len(whole.shapes) <= len(parts.shapes) <= len(whole.shapes) + 2
     for animation in (whole, parts):
-        targets = target_offsets(puppet.head) | animation.shapes
+        targets = morph_offsets(puppet.head) | animation.shapes
         shapes = np.stack([targets[name] for name in animation.target_names])
         for row, played in zip(animation.weights, moments, strict=True):
             found = puppet.head.mesh.vertices + np.tensordot(row, shapes, axes=1)
@@ -97,7 +97,7 @@ def test_a_long_performance_comes_in_batches(
 
 
 def test_units_and_whole_expressions_keep_name_and_weight(puppet: Puppet) -> None:
-    animation = performance(puppet.head, [moment(time) for time in TIMES], puppet.evaluate)
+    animation = bake_animation(puppet.head, [moment(time) for time in TIMES], puppet.evaluate)
     assert animation.target_names[:2] == ("jawOpen", "joy")
     columns = dict(zip(animation.target_names, animation.weights.T, strict=True))
     np.testing.assert_allclose(columns["jawOpen"], np.sin(6 * TIMES))
@@ -118,14 +118,14 @@ def test_what_targets_say_alone_needs_no_further_shape(puppet: Puppet) -> None:
         )
         for time in TIMES
     ]
-    animation = performance(puppet.head, still, puppet.evaluate)
+    animation = bake_animation(puppet.head, still, puppet.evaluate)
     assert set(animation.target_names) == {"joy", "jawOpen"}
     assert animation.rotations is None
     assert animation.translations_mm is None
 
 
 def test_the_heads_place_comes_along(puppet: Puppet) -> None:
-    animation = performance(puppet.head, [moment(time) for time in TIMES], puppet.evaluate)
+    animation = bake_animation(puppet.head, [moment(time) for time in TIMES], puppet.evaluate)
     np.testing.assert_allclose(animation.rotations[5], moment(TIMES[5]).rotation)
     np.testing.assert_allclose(animation.translations_mm[:, 1], TIMES)
 
@@ -138,7 +138,7 @@ def test_an_expression_with_a_units_name_is_told_apart(puppet: Puppet) -> None:
     ones = np.ones((len(half), 1))
     posed = PosedFace(half, ones, ones[:, 0])
     played = Moment(0.0, state, np.eye(3), np.zeros(3))
-    animation = performance(head, [played], lambda _: posed)
+    animation = bake_animation(head, [played], lambda _: posed)
     assert dict(zip(animation.target_names, animation.weights[0], strict=True)) == {
         "jawOpen": 0.25,
         "jawOpen_photo": 0.5,
@@ -147,16 +147,16 @@ def test_an_expression_with_a_units_name_is_told_apart(puppet: Puppet) -> None:
 
 def test_bad_input_is_named(puppet: Puppet) -> None:
     with pytest.raises(InputError, match="moments: expected at least one, got none"):
-        performance(puppet.head, [], puppet.evaluate)
+        bake_animation(puppet.head, [], puppet.evaluate)
     with pytest.raises(InputError, match="tolerance_mm: expected a number above zero, got 0"):
-        performance(puppet.head, [moment(0)], puppet.evaluate, tolerance_mm=0)
+        bake_animation(puppet.head, [moment(0)], puppet.evaluate, tolerance_mm=0)
     back = [moment(0.5), moment(0.25)]
     with pytest.raises(InputError, match="times: expected each later"):
-        performance(puppet.head, back, puppet.evaluate)
+        bake_animation(puppet.head, back, puppet.evaluate)
 
 
 def test_further_shapes_must_fit(puppet: Puppet) -> None:
-    animation = performance(puppet.head, [moment(0.0), moment(0.5)], puppet.evaluate)
+    animation = bake_animation(puppet.head, [moment(0.0), moment(0.5)], puppet.evaluate)
     shape = next(iter(animation.shapes.values()))
     with pytest.raises(InputError, match=r"shapes: expected names .* no other target has, got joy"):
         glb_bytes(puppet.head, animation=replace(animation, shapes={"joy": shape}))

@@ -1,8 +1,8 @@
-"""A performance of the rig as an animation of morph targets, exact where targets alone are not.
+"""The rig's motion baked into an animation of morph targets, with corrective shapes.
 
 Morph targets add up; the rig does more: weights by region, eyes that turn, lids that stay on the
-eyeballs. What the sum of the targets misses is written as a few shapes more, which the animation
-moves along.
+eyeballs. What the sum of the targets misses is written as a few corrective shapes, which the
+animation moves, too.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from mien.animate.timeline import Moment
 from mien.arrays import Array, Float, check_positive
 from mien.errors import InputError
 from mien.head import NEUTRAL, Head
+from mien.io.mesh.export_surface import expression_target_name, morph_offsets
 from mien.io.mesh.head_animation import HeadAnimation
-from mien.io.mesh.surface import expression_target, target_offsets
 from mien.rig.state import FACE, FaceState, PosedFace
 
-MOTION = "motion"
-"""The further shapes are called motion_1, motion_2, …"""
+CORRECTIVE = "motion"
+"""Corrective shapes are called motion_1, motion_2, ..."""
 
 _BATCH = 128  # frames
 
 
-def performance(
+def bake_animation(
     head: Head,
     moments: Iterable[Moment],
     evaluate: Callable[[FaceState], PosedFace],
@@ -40,28 +40,32 @@ def performance(
     Face units and expressions of the whole face keep their names and weights.
 
     Args:
+        head: the head.
         moments: in the order of their times, one for each frame.
         evaluate: the rig's.
         tolerance_mm: how far any vertex may be from the rig's at these times.
+        name: of the animation.
 
     Raises:
         InputError: no moment, times that do not ascend, a tolerance of 0 or less.
     """
-    offsets = target_offsets(head)
-    shapes = _Shapes(check_positive("tolerance_mm", tolerance_mm), head.mesh.vertices.shape)
-    rows = _Rows()
+    offsets = morph_offsets(head)
+    shapes = _CorrectiveShapes(
+        check_positive("tolerance_mm", tolerance_mm), head.mesh.vertices.shape
+    )
+    rows = _Samples()
     for batch in _batches(moments):
         named = [_named_weights(head, moment.state) for moment in batch]
         moved = [evaluate(moment.state).vertices - head.mesh.vertices for moment in batch]
         for row, missed in zip(named, moved, strict=True):
             for target, weight in row.items():
                 missed -= weight * offsets[target]
-        shapes.cover(np.stack(moved))
+        shapes.add(np.stack(moved))
         rows.add(batch, named)
     if not rows.times:
         raise InputError("moments", "at least one", "none")
     motion, moving = shapes.result()
-    further = {f"{MOTION}_{index}": shape for index, shape in enumerate(moving, 1)}
+    further = {f"{CORRECTIVE}_{index}": shape for index, shape in enumerate(moving, 1)}
     rotations, translations = rows.head_motion()
     return HeadAnimation(
         times=np.concatenate(rows.times),
@@ -74,8 +78,8 @@ def performance(
     )
 
 
-class _Rows:
-    """Times, weights by target and head motion of what has been played, as arrays."""
+class _Samples:
+    """Times, weights by target and head motion of the moments so far, as arrays."""
 
     def __init__(self) -> None:
         self.names: list[str] = []
@@ -94,7 +98,7 @@ class _Rows:
         self._translations.append(np.stack([moment.translation for moment in batch]))
 
     def weights(self) -> Float[Array, "t k"]:
-        """Targets that came later are at 0 before."""
+        """(T, K); a target that first moves later is at 0 before."""
         missing = [len(self.names) - rows.shape[1] for rows in self._weights]
         padded = [
             np.pad(rows, ((0, 0), (0, more)))
@@ -115,15 +119,16 @@ def _named_weights(head: Head, state: FaceState) -> dict[str, float]:
     weights = {unit: weight for unit, weight in state.units.items() if unit in head.unit_names}
     for name, weight in state.expressions.get(FACE, {}).items():
         if name in head.expressions and name != NEUTRAL:
-            weights[expression_target(head, name)] = weight
+            weights[expression_target_name(head, name)] = weight
     return {target: weight for target, weight in weights.items() if weight}
 
 
-class _Shapes:
-    """Few shapes whose weighted sums come within a tolerance of every frame shown to it.
+class _CorrectiveShapes:
+    """Few shapes whose weighted sums come within a tolerance of every frame.
 
-    Frames come in batches, so that a long performance never lies in memory. Of what the shapes so
-    far miss in a batch, its principal components about rest are taken until nothing is missed.
+    Frames come in batches, so that a long performance never lies in memory. The
+    principal components, about rest, of what the shapes so far miss in a batch are added until
+    nothing is missed.
     """
 
     def __init__(self, tolerance: float, shape: tuple[int, ...]) -> None:
@@ -131,7 +136,7 @@ class _Shapes:
         self._directions = np.zeros((0, math.prod(shape)))  # orthonormal
         self._weights: list[Array] = []
 
-    def cover(self, frames: Float[Array, "t v 3"]) -> None:
+    def add(self, frames: Float[Array, "t v 3"]) -> None:
         flat = frames.reshape(len(frames), -1)
         left = flat - (flat @ self._directions.T) @ self._directions
         while np.linalg.norm(left.reshape(frames.shape), axis=-1).max(initial=0) > self._tolerance:
