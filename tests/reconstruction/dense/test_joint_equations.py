@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
+from mien.arrays import Array
+from mien.errors import EstimationError
 from mien.reconstruction.bundle.gauge import gauge_motions
 from mien.reconstruction.bundle.problem import BundleProblem, BundleState, CameraPrior, FocalGroups
 from mien.reconstruction.bundle.projection import CAMERA_SIZE
