@@ -12,7 +12,7 @@ from marbled import GENERIC, Person, at
 from mien.arrays import Array
 from mien.camera import Camera
 from mien.capture.faces.landmarks import Landmarks
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.numeric.rotation import rotation_from_vector
 from mien.reconstruction.expression.known_head import KnownHead
 from mien.reconstruction.features import Features, gather_features
@@ -57,8 +57,8 @@ def bump(middle: Array, *, width_mm: float, along: Sequence[float]) -> Array:
 
 
 def exactly_detected(
-    view: View, seen_from: Camera, vertices: Array, *, scores: Array | None = None
-) -> View:
+    view: CapturedView, seen_from: Camera, vertices: Array, *, scores: Array | None = None
+) -> CapturedView:
     """The photo with the landmarks of a perfect detector."""
     points = seen_from.project(GENERIC.landmark_positions(vertices))
     marks = Landmarks(
@@ -68,7 +68,7 @@ def exactly_detected(
 
 
 @cache
-def neutral_photo(yaw: float = 0.0) -> View:
+def neutral_photo(yaw: float = 0.0) -> CapturedView:
     """The person's photo from there, with exact landmarks."""
     view = Person(NEUTRAL, 1).seen_by(at(yaw), name=f"neutral {yaw:.0f}.png")
     return exactly_detected(view, at(yaw), NEUTRAL)

@@ -14,7 +14,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int, check_array, frozen
 from mien.assets.data_file import need, read_data, shares
 from mien.errors import DocumentError, InputError
-from mien.numeric.planar_similarity import estimate_planar_motion
+from mien.numeric.planar_similarity import estimate_planar_similarity
 
 __all__ = ["FeatureLayout", "load_feature_layout"]
 
@@ -97,7 +97,7 @@ class FeatureLayout:
             [Zhang 2006] section 12, eq. (8) and (9), over the rigid points.
         """
         points = check_array("points", points, (len(self.names), 2))
-        motion = estimate_planar_motion(self.template[self.rigid], points[self.rigid])
+        motion = estimate_planar_similarity(self.template[self.rigid], points[self.rigid])
         return motion(self.surround)
 
 

@@ -55,7 +55,7 @@ FINDING, FETCHING = "Finding the face", "Fetching the examples"
 DETECTING_AGAIN, WRITING = "Looking at them again", "Writing"
 COUNTED = (FINDING,)
 """Stages whose steps are pictures."""
-MAX_SIDE = 1200
+EXAMPLE_SIDE = 1200
 """px; larger photos are reduced to it: a face needs no more than some 600 px for its wrinkles."""
 
 
@@ -81,7 +81,7 @@ class ExampleRequest:
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     face: int | None = None
-    max_side: int = MAX_SIDE
+    max_side: int = EXAMPLE_SIDE
     even: bool = True
 
     def overrides(self, series: FaceSeries) -> SelectionOverrides:

@@ -11,7 +11,7 @@ from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.faces.detector import NO_FACE
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.progress import StepProgress
 from mien.reconstruction.features import gather_features
@@ -58,7 +58,7 @@ class Fit:
 
 
 def fit_views(
-    views: Sequence[View],
+    views: Sequence[CapturedView],
     generic: GenericHead,
     options: FitOptions,
     *,
@@ -84,7 +84,10 @@ def fit_views(
 
 
 def _fit_views(
-    views: Sequence[View], generic: GenericHead, options: FitOptions, progress: StepProgress | None
+    views: Sequence[CapturedView],
+    generic: GenericHead,
+    options: FitOptions,
+    progress: StepProgress | None,
 ) -> Fit:
     marked = [view for view in views if view.marked]
     faceless = [view for view in views if not view.marked]
@@ -121,7 +124,7 @@ def _fit_views(
 
 def _all_photos(
     solution: Solution,
-    faceless: Sequence[View],
+    faceless: Sequence[CapturedView],
     generic: GenericHead,
     options: FitOptions,
     progress: StepProgress | None,

@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
 from mien.progress import StepProgress
@@ -45,7 +45,7 @@ NOT_PLACED = "no face was found in it, and it does not look like the head that t
 
 def register_solution(
     solution: Solution,
-    faceless: Sequence[View],
+    faceless: Sequence[CapturedView],
     generic: GenericHead,
     progress: StepProgress | None = None,
 ) -> Solution:
@@ -153,7 +153,7 @@ def _far_turned(
     )
 
 
-def _lenses(views: Sequence[View]) -> Lenses:
+def _lenses(views: Sequence[CapturedView]) -> Lenses:
     focal = focal_beliefs(views)
     group = np.unique(same_lens(views), return_inverse=True)[1].reshape(-1)
     count = np.bincount(group)

@@ -11,14 +11,14 @@ from scipy.spatial import cKDTree
 from marbled import GENERIC, SHOWN, Person, detected
 from mien.arrays import Array
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.numeric.rotation import angle_between, rotation_from_vector
 from mien.numeric.similarity import estimate_similarity
 from mien.reconstruction.dense.joint import Lenses
 from mien.reconstruction.dense.register import Registration, register_views
 from mien.reconstruction.features import gather_features
 
-Photos = list[tuple[View, Camera]]
+Photos = list[tuple[CapturedView, Camera]]
 
 
 def lenses(photos: Photos) -> Lenses:

@@ -29,7 +29,7 @@ from mien.camera import Camera
 from mien.capture.annotations import Annotations
 from mien.capture.faces.detector import NO_FACE
 from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
 from mien.reconstruction.expression.fit import (
@@ -54,7 +54,7 @@ RESIDUAL = sum(
 CAMERAS = {"one photo": [at(6, -3)], "three photos": [at(-22, 3), at(4), at(24, -3)]}
 
 
-def shown(vertices: Array, cameras: Sequence[Camera]) -> list[View]:
+def shown(vertices: Array, cameras: Sequence[Camera]) -> list[CapturedView]:
     who = Person(vertices, 1)
     return [
         exactly_detected(who.seen_by(item, name=f"{k}.png"), item, vertices)

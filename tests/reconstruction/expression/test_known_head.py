@@ -14,7 +14,7 @@ from mien.arrays import Array
 from mien.camera import Camera
 from mien.capture.annotations import Annotations
 from mien.capture.faces.landmarks import Landmarks
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.reconstruction.expression.known_head import (
     EXPRESSED_EDGE_MM,
     EXPRESSED_SKIN_MM,
@@ -30,7 +30,7 @@ CAMERA = at(5, 2)
 TRUE = making(weights_of(mouthSmile=0.6, jawOpen=0.3))
 
 
-def detected(seen_from: Camera, vertices: Array, confidence: Array | None = None) -> View:
+def detected(seen_from: Camera, vertices: Array, confidence: Array | None = None) -> CapturedView:
     points = seen_from.project(GENERIC.landmark_positions(vertices) + OFF_MM)
     sure = np.ones(478) if confidence is None else confidence
     landmarks = Landmarks(points, sure, np.zeros(52), seen_from.R_cam_head)
@@ -42,7 +42,7 @@ def known_from(cameras: Sequence[Camera], confidence: Array | None = None) -> Kn
     return KnownHead(views, cameras, NEUTRAL, GENERIC.unit_offsets, GENERIC)
 
 
-def sightings_in(view: View, known: KnownHead) -> Sightings:
+def sightings_in(view: CapturedView, known: KnownHead) -> Sightings:
     return feature_sightings(gather_features([view], GENERIC), known)
 
 

@@ -27,9 +27,9 @@ from mien.errors import EstimationError, InputError
 from mien.progress import StepProgress
 from mien.reading.names import plain_name
 
-__all__ = ["FaceSeries", "Look", "find_faces", "load_pictures", "row_of", "rows_of"]
+__all__ = ["FaceSeries", "PictureCallback", "find_faces", "load_pictures", "row_of", "rows_of"]
 
-Look = Callable[[UInt8[Array, "h w 3"], Float[Array, "478 2"]], None]
+PictureCallback = Callable[[UInt8[Array, "h w 3"], Float[Array, "478 2"]], None]
 """Told of each picture that shows a face, in the series' order, and where its landmarks are."""
 
 
@@ -78,7 +78,7 @@ def find_faces(
     max_side: int,
     kind: SourceKind | None = None,
     face: int | None = None,
-    look: Look | None = None,
+    look: PictureCallback | None = None,
     report: StepProgress | None = None,
 ) -> FaceSeries:
     """The face in every photo of a folder or in every frame of a video.
@@ -129,7 +129,7 @@ def load_pictures(
 class _Gathered:
     """What was found so far."""
 
-    def __init__(self, source: Path, max_side: int, look: Look) -> None:
+    def __init__(self, source: Path, max_side: int, look: PictureCallback) -> None:
         self.source, self.max_side, self.look = source, max_side, look
         self.is_video = False
         self.files: list[Path] = []

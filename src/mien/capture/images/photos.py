@@ -16,7 +16,7 @@ from mien.reading.names import named_path, plain_name
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-MAX_SIDE = 4096
+DEFAULT_MAX_SIDE = 4096
 """Longest side, in px, of a photo in memory unless the caller says otherwise."""
 
 _JPEG = (".jpg", ".jpeg", ".jpe", ".jfif", ".mpo")
@@ -69,7 +69,7 @@ class Photo:
         return max(self.size) / max(self.original_size)
 
 
-def load_photo(path: str | Path, *, max_side: int = MAX_SIDE) -> Photo:
+def load_photo(path: str | Path, *, max_side: int = DEFAULT_MAX_SIDE) -> Photo:
     """A photo, turned upright, converted to 8-bit sRGB, at most `max_side` px long.
 
     Nothing is ever held as floating point, and a JPEG that will be shrunk is decoded at a reduced

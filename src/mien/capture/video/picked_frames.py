@@ -12,7 +12,7 @@ from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.faces.mediapipe_face import DetectedFace
 from mien.capture.faces.sharpness import face_sharpness
 from mien.capture.folder import NEUTRAL
-from mien.capture.images.photos import MAX_SIDE, Photo, shrunk
+from mien.capture.images.photos import DEFAULT_MAX_SIDE, Photo, shrunk
 from mien.capture.video.clip_notes import ClipNotes
 from mien.capture.video.expression_selection import choose_expressions, name_expressions
 from mien.capture.video.frame_photos import fetch_frames
@@ -48,7 +48,7 @@ def pick_frames(
     count: int = 7,
     expressions: int | None = None,
     detector: LandmarkDetector,
-    max_side: int = MAX_SIDE,
+    max_side: int = DEFAULT_MAX_SIDE,
     progress: StepProgress | None = None,
 ) -> PickedFrames:
     """Sharp frames with diverse poses of the head at rest, and one of each other expression.

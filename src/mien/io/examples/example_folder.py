@@ -28,7 +28,7 @@ from mien.io.examples.example_json import (
 from mien.io.files.atomic import atomic_folder, check_folder_place
 from mien.io.files.image import encode_image, load_image
 from mien.io.files.leftovers import finish_replacement
-from mien.numeric.kernels.threads import side_by_side
+from mien.numeric.kernels.threads import run_concurrently
 from mien.reading.names import is_inside, named_path
 from mien.reading.npz import ArrayFile
 from mien.reading.strict_json import as_list, as_object, as_text, errors_name_file, need, read_json
@@ -171,7 +171,7 @@ def _from_json(folder: Path, data: dict[str, Any], layout: FeatureLayout) -> Exa
         partial(_example, folder, entry, f"examples[{i}]", layout)
         for i, entry in enumerate(entries)
     ]
-    examples = tuple(side_by_side(*reading))
+    examples = tuple(run_concurrently(*reading))
     if not examples:
         raise DocumentError("examples", "expected at least one, the neutral face; found none")
     names = [example.name for example in examples]

@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int, check_array
 from mien.camera import Camera
 from mien.errors import EstimationError, InputError
-from mien.numeric.solvers.levenberg_marquardt import LmResult, minimize_lm
+from mien.numeric.solvers.levenberg_marquardt import LevenbergMarquardtResult, minimize_lm
 from mien.numeric.solvers.robust import loss_named
 from mien.reconstruction.bundle.problem import (
     POSE_SIZE,
@@ -125,7 +125,10 @@ def adjust_bundle(
 
 
 def _adjustment(
-    starts: Sequence[Camera], image_points: Array, data: BundleData, result: LmResult[Bundle]
+    starts: Sequence[Camera],
+    image_points: Array,
+    data: BundleData,
+    result: LevenbergMarquardtResult[Bundle],
 ) -> Adjustment:
     bundle = result.x
     cameras = _cameras(starts, bundle, data)

@@ -12,7 +12,7 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.camera import Camera
-from mien.numeric.segment_sum import GroupSums
+from mien.numeric.segment_sum import SegmentSum
 from mien.reconstruction.dense.joint_problem import CameraPrior, JointState, PlacePrior, Sightings
 from mien.reconstruction.dense.projection import Projection, project_places
 
@@ -35,10 +35,10 @@ class JointProblem:
         principal = np.stack([camera.principal for camera in cameras])
         self.image = sightings.image_points - principal[sightings.photo]
         places, photos = len(prior.mean), len(cameras)
-        self.by_place = GroupSums(sightings.place, places)
-        self.by_photo = GroupSums(sightings.photo, photos)
+        self.by_place = SegmentSum(sightings.place, places)
+        self.by_photo = SegmentSum(sightings.photo, photos)
         both = sightings.place * photos + sightings.photo
-        self.by_place_and_photo = GroupSums(both, places * photos)
+        self.by_place_and_photo = SegmentSum(both, places * photos)
         # (3N, C): as one matrix, so that sums over places are single products.
         self.basis = np.ascontiguousarray(prior.components.reshape(len(prior.components), -1).T)
 

@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.mesh import Mesh
 from mien.numeric.rotation import angle_between
 from mien.progress import StepProgress, no_step_progress
@@ -75,7 +75,7 @@ class Registration:
 
 
 def register_views(
-    views: Sequence[View],
+    views: Sequence[CapturedView],
     cameras: Sequence[Camera],
     vertices: Float[Array, "v 3"],
     features: Features,
@@ -126,7 +126,7 @@ def register_views(
 
 
 def deviation_by_features(
-    views: Sequence[View],
+    views: Sequence[CapturedView],
     cameras: Sequence[Camera],
     vertices: Float[Array, "v 3"],
     features: Features,
@@ -152,7 +152,7 @@ class _State:
 class _Problem:
     """What stays the same from round to round."""
 
-    views: Sequence[View]
+    views: Sequence[CapturedView]
     features: Features
     lenses: Lenses
     generic: GenericHead

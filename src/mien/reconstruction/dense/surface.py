@@ -13,7 +13,7 @@ from mien.arrays import Array, Bool, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.mesh import Mesh
-from mien.numeric.segment_sum import GroupSums
+from mien.numeric.segment_sum import SegmentSum
 from mien.reconstruction.dense.joint import matching_noise
 from mien.reconstruction.dense.projection import Pinholes, project_places
 from mien.reconstruction.dense.surface_tracks import Tracks
@@ -57,7 +57,7 @@ def measure_offsets(
     start = tracks.on(mesh.vertices)
     normals = tracks.on(mesh.vertex_normals())
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    pinholes, by_place = Pinholes.of(cameras), GroupSums(tracks.place, len(start))
+    pinholes, by_place = Pinholes.of(cameras), SegmentSum(tracks.place, len(start))
     principal = np.stack([camera.principal for camera in cameras])
     image = tracks.image_points - principal[tracks.photo]
     weak = np.eye(3) / _FAR_MM**2

@@ -12,7 +12,7 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.faces.detector import NO_FACE
 from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
 from mien.progress import StepProgress, no_step_progress
@@ -63,7 +63,7 @@ class ExpressionFit:
 
 
 def fit_expression(
-    views: Sequence[View], known: KnownHead, *, progress: StepProgress | None = None
+    views: Sequence[CapturedView], known: KnownHead, *, progress: StepProgress | None = None
 ) -> ExpressionFit:
     """Cameras, face units and shape of an expression, from one photo on.
 
@@ -108,7 +108,7 @@ class _Found:
     typical_misfits: Float[Array, " k"]
 
 
-def _fit(views: Sequence[View], known: KnownHead, tell: StepProgress) -> _Found:
+def _fit(views: Sequence[CapturedView], known: KnownHead, tell: StepProgress) -> _Found:
     generic = known.generic
     features = gather_features(views, generic)
     focal, focal_sd = _lenses(views, known)
@@ -174,7 +174,7 @@ def _without_skin(sightings: Sightings, first: int, photos: Sequence[int]) -> Si
 
 
 def _lenses(
-    views: Sequence[View], known: KnownHead
+    views: Sequence[CapturedView], known: KnownHead
 ) -> tuple[Float[Array, " k"], Float[Array, " k"]]:
     """(K,) focal lengths, px, and the standard deviation of their logarithms."""
     beliefs = focal_beliefs(views)
@@ -186,7 +186,7 @@ def _lenses(
     return focal, deviation
 
 
-def _expected_units(views: Sequence[View], known: KnownHead) -> Float[Array, " 52"]:
+def _expected_units(views: Sequence[CapturedView], known: KnownHead) -> Float[Array, " 52"]:
     """(52,) what the detector scores above the neutral photos, as shares of what is left to 1."""
     rest, scores = (
         np.mean(
@@ -201,7 +201,7 @@ def _expected_units(views: Sequence[View], known: KnownHead) -> Float[Array, " 5
 
 def _with_skin(
     sightings: Sightings,
-    views: Sequence[View],
+    views: Sequence[CapturedView],
     cameras: Sequence[Camera],
     vertices: Float[Array, "v 3"],
     known: KnownHead,
@@ -221,11 +221,11 @@ def _held(generic: GenericHead) -> Float[Array, " v"]:
     return np.minimum(np.asarray(still), 1.0)
 
 
-def _gaze(views: Sequence[View], found: Explained, known: KnownHead) -> Float[Array, "2 2"]:
+def _gaze(views: Sequence[CapturedView], found: Explained, known: KnownHead) -> Float[Array, "2 2"]:
     """(2, 2) rad, beyond neutral's; 0 of an eye that is shut."""
     generic = known.generic
 
-    def mean(group: Sequence[View], cameras: Sequence[Camera]) -> Array | None:
+    def mean(group: Sequence[CapturedView], cameras: Sequence[Camera]) -> Array | None:
         seen = [
             iris_directions(view, camera, known.vertices, generic)
             for view, camera in zip(group, cameras, strict=True)

@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.reconstruction.features import EDGE_SIGMA_MM, Features, gather_features
 from mien.reconstruction.observations import Sightings
 
@@ -34,7 +34,7 @@ class KnownHead:
         units: (52, V, 3) mm, the face units of this head.
     """
 
-    views: Sequence[View]
+    views: Sequence[CapturedView]
     cameras: Sequence[Camera]
     vertices: Float[Array, "v 3"]
     units: Float[Array, "52 v 3"]

@@ -9,7 +9,7 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, Int
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.mesh import Mesh
 from mien.numeric.raster.rasterizer import interpolate
 from mien.numeric.rotation import angle_between
@@ -26,7 +26,7 @@ _PATCH_PX, _LEAST_STEP_PX = 8, 2
 
 
 def follow_skin(
-    view: View,
+    view: CapturedView,
     camera: Camera,
     vertices: Float[Array, "v 3"],
     known: KnownHead,
@@ -93,7 +93,9 @@ def _nearest(camera: Camera, known: KnownHead) -> int:
     return int(np.argmin(turned))
 
 
-def _sight(view: View, camera: Camera, mesh: Mesh, other: Mesh, scale: float) -> Sight | None:
+def _sight(
+    view: CapturedView, camera: Camera, mesh: Mesh, other: Mesh, scale: float
+) -> Sight | None:
     """The photo's view of a mesh, its points where the other mesh has them."""
     crop = crop_view(view, camera, mesh, scale)
     if crop is None:
