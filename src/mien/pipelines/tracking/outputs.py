@@ -32,7 +32,7 @@ OVERLAY, PLOTS = "Drawing the overlay", "Drawing plots"
 
 @dataclass(frozen=True)
 class TrackFiles:
-    """Where the results go; None: not wanted.
+    """Which files a track is written to; None: not written.
 
     Attributes:
         table: TRACK.csv, with TRACK.json beside it.
