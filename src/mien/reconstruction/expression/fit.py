@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.faces.detector import NO_FACE
+from mien.capture.faces.detector import NO_FACE_FOUND
 from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
 from mien.capture.source import CapturedView
 from mien.errors import EstimationError
@@ -81,7 +81,7 @@ def fit_expression(
     from threadpoolctl import threadpool_limits
 
     tell = progress or no_step_progress
-    left_out = {view.photo.name: NO_FACE for view in views if not view.marked}
+    left_out = {view.photo.name: NO_FACE_FOUND for view in views if not view.marked}
     views = [view for view in views if view.marked]
     counts = gather_features(views, known.generic).seen.sum(axis=1) if views else []
     for view, count in zip(views, counts, strict=True):
