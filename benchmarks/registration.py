@@ -29,7 +29,7 @@ from benchmarks.scan import DATA, Scan, SurfaceError, load_scan
 from benchmarks.table import markdown_table, write_results
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead, load_generic_head
-from mien.capture.source import View, load_capture
+from mien.capture.source import CapturedView, load_capture
 from mien.errors import EstimationError
 from mien.reconstruction.fit import Fit, FitOptions, fit_views
 
@@ -140,13 +140,13 @@ def _same_point(
     return fitted, unfitted
 
 
-def _views(case: Case) -> tuple[View, ...]:
+def _views(case: Case) -> tuple[CapturedView, ...]:
     views = without_marks(_capture(case.photos))
     return tuple(view for view in views if case.stems is None or view.photo.stem in case.stems)
 
 
 @cache
-def _capture(photos: Path) -> tuple[View, ...]:
+def _capture(photos: Path) -> tuple[CapturedView, ...]:
     return load_capture(photos).views
 
 

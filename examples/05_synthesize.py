@@ -36,7 +36,7 @@ if len(sys.argv) < 2:
         picture = renderer.draw(FaceState(units=units), camera, background=(96, 96, 104))
         Image.fromarray(picture[..., :3]).save(source / f"take_{number:02}.png")
 
-# The pictures that differ most become examples; all tell how the points move together.
+# The pictures that differ most become examples; all give the statistics of the points.
 gathered = gather_examples(source)
 save_examples(folder, gathered.examples, why=gathered.why)
 for note in gathered.notes:

@@ -153,7 +153,7 @@ def _write_examples(folder: Path) -> None:
     )
 
 
-def test_a_thousand_damaged_inputs_are_told_in_one_line(
+def test_a_thousand_damaged_inputs_raise_one_line_errors(
     readers: dict[str, Reader], tmp_path: Path
 ) -> None:
     others = [reader.files[-1].read_bytes() for reader in readers.values()]

@@ -12,7 +12,16 @@ import pytest
 
 from mien.errors import DocumentError, FileFormatError, InputError
 from mien.limits import MAX_CONTAINERS, MAX_DEPTH, MAX_DIGITS, MAX_JSON_BYTES
-from mien.reading.strict_json import as_array, as_names, as_number, as_whole, read_json, unknown
+from mien.reading.strict_json import (
+    DocumentFormat,
+    as_array,
+    as_names,
+    as_number,
+    as_whole,
+    errors_name_file,
+    read_json,
+    unknown,
+)
 
 
 def read(folder: Path, content: bytes) -> dict:
@@ -129,3 +138,30 @@ def test_names_of_a_million_letters_are_cut_short() -> None:
     start = time.perf_counter()
     assert len(unknown("unit", "a" * 1_000_000, [f"unit{i}" for i in range(1000)])) < 300
     assert time.perf_counter() - start < 1
+
+
+def test_a_format_is_that_of_its_header(tmp_path: Path) -> None:
+    format = DocumentFormat("mien thing", 2)
+    for version in (1, 2):
+        format.check(format.header | {"version": version})
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(format.header | {"version": 3}))
+    assert format.is_in(path), "of whatever version"
+    for other in ('{"format": "mien head"}', "[]", ""):
+        path.write_text(other)
+        assert not format.is_in(path)
+    assert not format.is_in(tmp_path / "nothing.json")
+    with pytest.raises(DocumentError, match="format: expected 'mien thing', found 'mien head'"):
+        format.check({"format": "mien head"})
+    with pytest.raises(DocumentError, match="version: 3 was written by a newer mien"):
+        format.check(format.header | {"version": 3})
+
+
+@pytest.mark.parametrize("error", [DocumentError("a", "expected b"), InputError("a", "b", "c")])
+def test_errors_of_a_document_name_its_file(error: Exception) -> None:
+    for line, place in ((None, "a: expected b"), (3, "line 3, a: expected b")):
+        with (
+            pytest.raises(FileFormatError, match=rf"^x\.json: {place}"),
+            errors_name_file("x.json", line),
+        ):
+            raise error

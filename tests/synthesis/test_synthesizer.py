@@ -11,12 +11,12 @@ from hull import hull_distances
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
 from mien.errors import EstimationError, InputError
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.synthesis.examples.example_set import Example, ExampleSet
 from mien.synthesis.synthesizer import Synthesis, SynthesisOptions, Synthesizer
 
 WIDTH, HEIGHT = 160, 200
-MOVED = PlanarMotion(np.array(1.1), np.array(0.15), np.array([-20.0, 4.0]))
+MOVED = PlanarSimilarity(np.array(1.1), np.array(0.15), np.array([-20.0, 4.0]))
 
 
 @pytest.fixture(scope="module")
@@ -200,7 +200,7 @@ def test_a_moved_head_is_drawn_where_it_is(person):
     synthesizer = Synthesizer(person[0])
     points = new_expression(person)
     still = synthesizer.synthesize(points).image
-    shift = PlanarMotion(np.array(1.0), np.array(0.0), np.array([7.0, 4.0]))
+    shift = PlanarSimilarity(np.array(1.0), np.array(0.0), np.array([7.0, 4.0]))
     moved = synthesizer.synthesize(shift(points), motion=shift, size=(WIDTH + 30, HEIGHT)).image
     assert moved.shape == (HEIGHT, WIDTH + 30, 3)
     difference = moved[4:, 7 : WIDTH + 7].astype(int) - still[:-4]

@@ -8,7 +8,7 @@ from mien.capture.faces.landmarks import Landmarks as Landmarks
 from mien.capture.images.photos import Photo as Photo
 from mien.capture.images.photos import load_photo as load_photo
 from mien.capture.source import Capture as Capture
-from mien.capture.source import View as View
+from mien.capture.source import CapturedView as CapturedView
 from mien.capture.source import load_capture as load_capture
 from mien.capture.video.video import Video as Video
 from mien.pipelines.demo import demo_photos as demo_photos

@@ -86,12 +86,13 @@ def animate_head(
     read: Iterable[str | Path] = (),
     progress: Progress | None = None,
 ) -> Take:
-    """Let a head perform a timeline; frames are made one at a time, and a run that is stopped
+    """Let a head perform a timeline, into a video, pictures, a model or a table.
 
-    leaves what was there.
+    Frames are made one at a time; what was at the place stays until the new file is whole.
 
     Args:
-        timeline: or the file that holds one (io.timeline.timeline_file.load_timeline).
+        head: the head.
+        timeline: or a file that holds one (mien.io.load_timeline).
         path: what to write, by its suffix: .mp4, .webm, .glb, .usdz, .csv (Live Link Face), .fap
             (MPEG-4); a name without one, or with a slash at its end, is a folder of pictures.
         fps: frames a second; the timeline's unless given.
@@ -100,7 +101,10 @@ def animate_head(
         pitch: radians, how the head is turned before it moves; for pictures.
         background: sRGB. Unless given, pictures and .webm have alpha and an .mp4 a plain grey.
         read: files and folders beside the timeline that must stay as they are, such as the head's.
-        progress: told the stage, the frames done and their total.
+        progress: called with the stage, frames done and their total.
+
+    Returns:
+        How many frames were written, and notes for the user.
 
     Raises:
         InputError: another suffix, a place that is read or cannot be written, a rate that a .fap

@@ -101,11 +101,20 @@ def build_head(
     options: BuildOptions | None = None,
     progress: Progress | None = None,
 ) -> Build:
-    """A textured head from a folder of photos, one photo, or a video.
+    """A textured head from a folder of photos, one photo or a video of a person.
+
+    Args:
+        source: photos of the face at rest; or a folder with a folder of photos for each expression,
+            one of them called "neutral"; or a video.
+        options: how; the defaults unless given.
+        progress: called with the stage, steps done and their total.
+
+    Returns:
+        The head (`Build.head`), what it was made from, and notes for the user.
 
     Raises:
-        InputError: the source.
-        FileFormatError: the source.
+        InputError: nothing at `source` that can be read, or no photo in it.
+        FileFormatError: a photo, a video or an annotation file is damaged.
         EstimationError: no photo fits.
     """
     options = options or BuildOptions()
@@ -296,6 +305,12 @@ def build_head_folder(
     progress: Progress | None = None,
 ) -> Build:
     """As build_head, and written as a head folder with its report and a turntable video.
+
+    Args:
+        source: as for build_head.
+        folder: to write; a head folder that is there is replaced.
+        options: as for build_head.
+        progress: as for build_head.
 
     Raises:
         as build_head; InputError: the place holds something that is no head folder, or cannot be

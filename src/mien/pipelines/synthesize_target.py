@@ -16,7 +16,7 @@ from mien.errors import EstimationError, InputError
 from mien.io.files.atomic import check_file_place, check_files_apart
 from mien.io.files.image import image_kind
 from mien.io.landmarks.points_file import load_feature_points
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.pipelines.example_annotations import (
     annotation_files,
     annotation_notes,
@@ -63,7 +63,7 @@ class SynthesisTarget:
     """
 
     points: Float[Array, "n 2"]
-    motion: PlanarMotion | None = None
+    motion: PlanarSimilarity | None = None
     size: tuple[int, int] | None = None
     notes: tuple[str, ...] = ()
 

@@ -10,8 +10,8 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.faces.detector import NO_FACE
-from mien.capture.source import View
+from mien.capture.faces.detector import NO_FACE_FOUND
+from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.progress import StepProgress
 from mien.reconstruction.features import gather_features
@@ -58,7 +58,7 @@ class Fit:
 
 
 def fit_views(
-    views: Sequence[View],
+    views: Sequence[CapturedView],
     generic: GenericHead,
     options: FitOptions,
     *,
@@ -84,13 +84,16 @@ def fit_views(
 
 
 def _fit_views(
-    views: Sequence[View], generic: GenericHead, options: FitOptions, progress: StepProgress | None
+    views: Sequence[CapturedView],
+    generic: GenericHead,
+    options: FitOptions,
+    progress: StepProgress | None,
 ) -> Fit:
     marked = [view for view in views if view.marked]
     faceless = [view for view in views if not view.marked]
     if not marked:
         names = ", ".join(view.photo.name for view in views)
-        raise EstimationError(f"{names}: {NO_FACE}")
+        raise EstimationError(f"{names}: {NO_FACE_FOUND}")
     left_out: dict[str, str] = {}
     while True:
         solution = solve_by_features(marked, gather_features(marked, generic), generic, options)
@@ -105,7 +108,7 @@ def _fit_views(
         solution = _all_photos(solution, faceless, generic, options, progress)
         left_out |= solution.problems
     else:
-        left_out |= {view.photo.name: NO_FACE for view in faceless}
+        left_out |= {view.photo.name: NO_FACE_FOUND for view in faceless}
     if options.adjust:
         solution = _guided(solution, generic)
     vertices, cameras = _in_head_space(solution, generic, options)
@@ -121,7 +124,7 @@ def _fit_views(
 
 def _all_photos(
     solution: Solution,
-    faceless: Sequence[View],
+    faceless: Sequence[CapturedView],
     generic: GenericHead,
     options: FitOptions,
     progress: StepProgress | None,

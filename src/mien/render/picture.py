@@ -88,10 +88,10 @@ def render_head(
     state: FaceState | None = None,
     background: tuple[int, int, int] | None = None,
 ) -> UInt8[Array, "h w 4"]:
-    """The textured head, RGBA.
+    """A picture of the textured head, (H, W, 4) sRGB with alpha.
 
     Args:
-        head: or what HeadRenderer prepared of it, for many pictures of one head.
+        head: the head, or a HeadRenderer of it, which is faster for many pictures.
         yaw: radians, as docs/reference/conventions.md says.
         pitch: radians, as docs/reference/conventions.md says.
         roll: radians, as docs/reference/conventions.md says.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mien.arrays import Array, Float, frozen
-from mien.numeric.images.sampling import bilinear_place
+from mien.numeric.images.sampling import bilinear_neighbours
 from mien.numeric.kernels.jit import njit
 from mien.numeric.kernels.threads import for_row_bands
 from mien.texture.surface import SurfaceMap
@@ -112,7 +112,7 @@ def _add_rows(
             confidence[row, col] = max(confidence[row, col], certain)
             x, y, z = points[row, col]
             px, py, _ = project_point(pose, x, y, z)
-            x0, x1, y0, y1, fx, fy = bilinear_place(px, py, width, height)
+            x0, x1, y0, y1, fx, fy = bilinear_neighbours(px, py, width, height)
             for c in range(3):
                 above = (1.0 - fx) * photo[y0, x0, c] + fx * photo[y0, x1, c]
                 below = (1.0 - fx) * photo[y1, x0, c] + fx * photo[y1, x1, c]

@@ -10,7 +10,7 @@ from mien.arrays import Array, Bool, Float, UInt8, check_image, check_positive, 
 from mien.camera import Camera
 from mien.errors import InputError
 from mien.mesh import Mesh
-from mien.numeric.images.sampling import bilinear_place
+from mien.numeric.images.sampling import bilinear_neighbours
 from mien.numeric.kernels.jit import njit
 from mien.numeric.kernels.threads import for_row_bands
 from mien.numeric.raster.rasterizer import rasterize
@@ -259,7 +259,7 @@ def project_point(pose: Array, x: float, y: float, z: float) -> tuple[float, flo
 def _is_shown(depth_map: Array, usable: Array, x: float, y: float, nearest: float) -> bool:
     """Whether all four pixels that a lookup reads are usable and none shows anything nearer."""
     height, width = depth_map.shape
-    x0, x1, y0, y1, _, _ = bilinear_place(x, y, width, height)
+    x0, x1, y0, y1, _, _ = bilinear_neighbours(x, y, width, height)
     for row in (y0, y1):
         for col in (x0, x1):
             if not usable[row, col] or depth_map[row, col] < nearest:

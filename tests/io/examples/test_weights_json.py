@@ -26,9 +26,7 @@ def example_set() -> ExampleSet:
     return ExampleSet(layout, examples, 0, np.stack([points] * 2), subregions)
 
 
-def test_shares_are_told_by_name_the_greatest_first(
-    tmp_path: Path, example_set: ExampleSet
-) -> None:
+def test_coefficients_are_by_name_largest_first(tmp_path: Path, example_set: ExampleSet) -> None:
     names = example_set.subregions.names
     shares = np.tile([0.25, 0.75, 0.0], (len(names), 1))
     shares[1] = [1 - 1e-5, 0, 1e-5]

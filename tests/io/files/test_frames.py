@@ -18,7 +18,7 @@ def pictures(count: int, channels: int = 4) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("channels", [3, 4])
-def test_pictures_come_back_exactly(tmp_path: Path, channels: int) -> None:
+def test_pictures_round_trip_exactly(tmp_path: Path, channels: int) -> None:
     given = pictures(3, channels)
     assert save_frames(tmp_path / "out", iter(given), name="james") == 3
     files = sorted((tmp_path / "out").iterdir())

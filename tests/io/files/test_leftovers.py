@@ -70,7 +70,7 @@ def test_the_next_run_removes_what_a_killed_one_left(tmp_path: Path, moment: str
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no SIGKILL")
-def test_a_folder_moved_aside_by_a_killed_run_comes_back(tmp_path: Path) -> None:
+def test_a_folder_moved_aside_by_a_killed_run_round_trips(tmp_path: Path) -> None:
     place = tmp_path / "head"
     place.mkdir()
     (place / "head.json").write_text("old")
@@ -98,7 +98,7 @@ def test_of_two_the_one_in_place_counts(tmp_path: Path) -> None:
     assert names(tmp_path / "head") == ["new"]
 
 
-def test_what_lives_stays(tmp_path: Path) -> None:
+def test_temporary_files_of_running_processes_stay(tmp_path: Path) -> None:
     with atomic_file(tmp_path / "mine") as own:
         leftovers._cleaned.clear()
         # The parent process runs this test, so it is alive.
@@ -132,7 +132,7 @@ def test_of_other_machines_after_a_day(tmp_path: Path) -> None:
         assert not old.exists()
 
 
-def test_files_of_like_names_are_none_of_ours(tmp_path: Path) -> None:
+def test_files_of_similar_names_stay(tmp_path: Path) -> None:
     others = [".mien-notes.tmp", ".mien-files.json", ".head.1a2b3c4d.tmp"]
     for name in others:
         (tmp_path / name).write_text("mine")

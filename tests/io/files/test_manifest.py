@@ -192,7 +192,7 @@ def test_empty_folders_stay(place: Path) -> None:
     assert not (place / "deep").exists()
 
 
-def test_what_people_are_meant_to_change_stays(place: Path) -> None:
+def test_editable_files_stay(place: Path) -> None:
     (place / "a").write_text("painted")
     for _ in range(2):
         write(place, {"a": "1", "deep/b": "2"}, editable=("a",))
@@ -200,7 +200,7 @@ def test_what_people_are_meant_to_change_stays(place: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["", "{", '{"format": "x"}', '{"files": [1]}', "absent"])
-def test_without_a_list_nothing_counts_as_miens(place: Path, damage: str) -> None:
+def test_without_a_manifest_no_file_counts_as_miens(place: Path, damage: str) -> None:
     if damage == "absent":
         (place / MANIFEST).unlink()
     else:

@@ -28,7 +28,7 @@ def read(path: Path) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize(("suffix", "codec"), [(".mp4", "h264"), (".webm", "vp9")])
-def test_frames_come_back(tmp_path: Path, suffix: str, codec: str) -> None:
+def test_frames_round_trip(tmp_path: Path, suffix: str, codec: str) -> None:
     path = tmp_path / f"clip{suffix}"
     assert save_video(path, frames(7), 25) == 7
     with av.open(path) as container:
@@ -145,7 +145,7 @@ def test_alpha_comes_back_from_a_webm(tmp_path: Path) -> None:
     assert np.abs(seen[8, 12].astype(int) - given[0][8, 12, :3]).max() <= 6
 
 
-def test_alpha_wants_a_webm(tmp_path: Path) -> None:
+def test_alpha_needs_a_webm(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"clip\.mp4: expected a \.webm for pictures with alpha"):
         save_video(tmp_path / "clip.mp4", [np.zeros((8, 8, 4), np.uint8)], 25)
     mixed = [np.zeros((8, 8, 4), np.uint8), np.zeros((8, 8, 3), np.uint8)]

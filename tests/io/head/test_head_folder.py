@@ -42,7 +42,7 @@ def saved(small_head: Head, tmp_path: Path) -> Path:
     return tmp_path / "head"
 
 
-def test_what_is_saved_comes_back(small_head: Head, saved: Path) -> None:
+def test_what_is_saved_round_trips(small_head: Head, saved: Path) -> None:
     loaded = load_head(saved)
     for name in ("subject", "unit_names", "left_out", "generator"):
         assert getattr(loaded, name) == getattr(small_head, name)
@@ -70,7 +70,7 @@ def expressive(head: Head) -> Head:
     return replace(head, expressions={**head.expressions, "joy": joy}, shading=shading)
 
 
-def test_what_expressions_are_made_of_comes_back(small_head: Head, tmp_path: Path) -> None:
+def test_what_expressions_are_made_of_round_trips(small_head: Head, tmp_path: Path) -> None:
     head = expressive(small_head)
     save_head(head, tmp_path / "h")
     loaded = load_head(tmp_path / "h")
@@ -103,7 +103,7 @@ def test_a_head_of_an_older_mien_loads(small_head: Head, tmp_path: Path) -> None
         np.testing.assert_array_equal(view.gains, np.ones(3))
 
 
-def test_cameras_come_back_to_the_last_bit(small_head: Head, saved: Path) -> None:
+def test_cameras_round_trip_to_the_last_bit(small_head: Head, saved: Path) -> None:
     for loaded, view in zip(load_head(saved).views, small_head.views, strict=True):
         for name in ("width", "height", "focal_px"):
             assert getattr(loaded.camera, name) == getattr(view.camera, name)
@@ -379,7 +379,7 @@ def test_a_wrong_entry_is_named(
         (put("textures", "atlas", to="textures/a\0.png"), "expected a path inside the folder"),
     ],
 )
-def test_what_was_once_accepted_silently_is_told(
+def test_values_that_no_head_has_raise(
     saved: Path, change: Callable[[dict[str, Any]], object], message: str
 ) -> None:
     edit_json(saved, change)
@@ -388,7 +388,7 @@ def test_what_was_once_accepted_silently_is_told(
     assert str(caught.value).startswith(str(saved))
 
 
-def test_deep_and_long_and_doubled_json_is_told(saved: Path, small_head: Head) -> None:
+def test_deep_and_long_and_doubled_json_raises(saved: Path, small_head: Head) -> None:
     """One reader reads it, whatever is to be done with it; what is no head's is not replaced."""
     path = saved / "head.json"
     for text, problem in (
@@ -446,7 +446,7 @@ def change_arrays(folder: Path, **changed: Any) -> None:
         ("uncertainty_mm", lambda a: a[:-1], "uncertainty_mm: expected shape"),
     ],
 )
-def test_arrays_that_no_head_has_are_told(
+def test_arrays_that_no_head_has_raise(
     saved: Path, name: str, change: Callable[[np.ndarray], np.ndarray], message: str
 ) -> None:
     with np.load(saved / "geometry.npz") as file:

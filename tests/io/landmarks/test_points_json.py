@@ -20,7 +20,7 @@ def layout() -> FeatureLayout:
     return load_feature_layout()
 
 
-def test_points_come_back(tmp_path: Path, layout: FeatureLayout) -> None:
+def test_points_round_trip(tmp_path: Path, layout: FeatureLayout) -> None:
     path = tmp_path / "P.json"
     given = {"menton": np.array([10.25, 300.5]), "nose_tip": np.array([-1.0, 7.0])}
     save_points_json(path, layout, given)

@@ -31,7 +31,7 @@ def test_the_first_pixels_centre_is_half_a_pixel_in(tmp_path: Path) -> None:
     np.testing.assert_allclose(load_pts(path), [[0.5, 0.5], [10, 19.75]])
 
 
-def test_what_is_written_comes_back(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_what_is_written_round_trips(tmp_path: Path, rng: np.random.Generator) -> None:
     points = np.round(rng.uniform(-5, 900, (68, 2)), 3)
     save_pts(tmp_path / "a.pts", points)
     text = (tmp_path / "a.pts").read_text()
@@ -76,7 +76,7 @@ def test_the_68_points_of_a_symmetric_face_are_symmetric(layout: FeatureLayout) 
         ("version: 1\nn_points: 0\n{\n}\n", "n_points says 0, found 0 points"),
     ],
 )
-def test_bad_files_are_told(tmp_path: Path, text: str, message: str) -> None:
+def test_bad_files_raise(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "bad.pts"
     path.write_text(text)
     with pytest.raises(FileFormatError, match=message) as raised:
@@ -84,7 +84,7 @@ def test_bad_files_are_told(tmp_path: Path, text: str, message: str) -> None:
     assert str(raised.value).startswith(str(path))
 
 
-def test_bad_values_are_told(tmp_path: Path, layout: FeatureLayout) -> None:
+def test_bad_values_raise(tmp_path: Path, layout: FeatureLayout) -> None:
     with pytest.raises(InputError, match="points: expected finite"):
         save_pts(tmp_path / "a.pts", np.full((68, 2), np.inf))
     with pytest.raises(InputError, match=r"points: expected shape \(68, 2\)"):
@@ -109,7 +109,7 @@ def test_files_of_other_programs_read(tmp_path: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize("version", ["2", "1.1", "10", "1.0.0"])
-def test_other_versions_are_told(tmp_path: Path, version: str) -> None:
+def test_other_versions_raise(tmp_path: Path, version: str) -> None:
     (tmp_path / "a.pts").write_text(HEAD.replace("1", version) + "1 1\n2 2\n}\n")
     with pytest.raises(FileFormatError, match="expected 'version: 1', 'n_points: 68' and"):
         load_pts(tmp_path / "a.pts")

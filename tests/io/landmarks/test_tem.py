@@ -42,7 +42,7 @@ def test_a_file_without_lines_and_with_other_ends_of_line_reads(tmp_path: Path) 
     assert found.lines == ()
 
 
-def test_a_layouts_points_come_back(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_a_layouts_points_round_trip(tmp_path: Path, rng: np.random.Generator) -> None:
     layout = load_feature_layout()
     points = np.round(rng.uniform(0, 900, (134, 2)), 3)
     save_tem(tmp_path / "a.tem", points_to_tem(layout, points))
@@ -69,7 +69,7 @@ def test_a_layouts_points_come_back(tmp_path: Path, rng: np.random.Generator) ->
         ("3\n1 2\n3 4\n5 6\n1\n0\n2\n0\n", "ends before a line's point"),
     ],
 )
-def test_bad_files_are_told(tmp_path: Path, text: str, message: str) -> None:
+def test_bad_files_raise(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "bad.tem"
     path.write_text(text)
     with pytest.raises(FileFormatError, match=message) as raised:
@@ -77,7 +77,7 @@ def test_bad_files_are_told(tmp_path: Path, text: str, message: str) -> None:
     assert str(raised.value).startswith(str(path))
 
 
-def test_other_bytes_and_no_file_are_told(tmp_path: Path) -> None:
+def test_other_bytes_and_no_file_raise(tmp_path: Path) -> None:
     (tmp_path / "bad.tem").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(FileFormatError, match="found other bytes"):
         load_tem(tmp_path / "bad.tem")
@@ -94,7 +94,7 @@ def test_bad_values_are_not_written(tmp_path: Path) -> None:
     assert not path.exists()
 
 
-def test_another_template_is_told() -> None:
+def test_another_template_raises() -> None:
     delineation = Delineation(np.zeros((71, 2)), ())
     with pytest.raises(OtherPointsError) as raised:
         points_from_tem(delineation, load_feature_layout(), "a.tem")

@@ -47,7 +47,7 @@ def test_the_header_is_the_apps(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("fps", [12.0, 24.0, 25.0, 29.97, 30.0, 59.94, 60.0, 120.0])
 @pytest.mark.parametrize("seconds", [0.4, 2.5])
-def test_a_performance_comes_back(tmp_path: Path, fps: float, seconds: float) -> None:
+def test_a_performance_round_trips(tmp_path: Path, fps: float, seconds: float) -> None:
     timeline = performance(fps, seconds)
     given = list(moments(timeline))
     assert save_live_link(tmp_path / "a.csv", given) == len(given)
@@ -210,7 +210,7 @@ BAD += [
 
 
 @pytest.mark.parametrize(("lines", "message"), BAD)
-def test_bad_files_are_told_in_one_line(tmp_path: Path, lines: dict, message: str) -> None:
+def test_bad_files_raise_one_line_errors(tmp_path: Path, lines: dict, message: str) -> None:
     path = recording(tmp_path, lines=lines)
     with pytest.raises(FileFormatError) as caught:
         load_live_link(path)

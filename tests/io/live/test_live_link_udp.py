@@ -65,7 +65,7 @@ def test_a_moment_has_the_recordings_angles() -> None:
 
 @pytest.mark.parametrize("seconds", [0.0, 1 / 120, 59.99999, 86399.999])
 @pytest.mark.parametrize("subject", ["a", "Zoë", "x" * 255])
-def test_a_packet_comes_back(subject: str, seconds: float) -> None:
+def test_a_packet_round_trips(subject: str, seconds: float) -> None:
     sent = packet(subject, seconds, tongueOut=0.125, HeadYaw=-1.5)
     back = decode(encode(sent))
     assert (back.subject, back.values) == (subject, sent.values)

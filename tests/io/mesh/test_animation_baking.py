@@ -108,7 +108,7 @@ def test_units_and_whole_expressions_keep_name_and_weight(puppet: Puppet) -> Non
     assert all(np.abs(columns[name]).max() == pytest.approx(1) for name in further)
 
 
-def test_what_targets_say_alone_needs_no_further_shape(puppet: Puppet) -> None:
+def test_motion_of_the_targets_alone_needs_no_corrective_shape(puppet: Puppet) -> None:
     still = [
         replace(
             moment(time),
@@ -130,7 +130,7 @@ def test_the_heads_place_comes_along(puppet: Puppet) -> None:
     np.testing.assert_allclose(animation.translations_mm[:, 1], TIMES)
 
 
-def test_an_expression_with_a_units_name_is_told_apart(puppet: Puppet) -> None:
+def test_an_expression_with_a_units_name_gets_another(puppet: Puppet) -> None:
     joy = puppet.head.expressions["joy"]
     head = replace(puppet.head, expressions=puppet.head.expressions | {"jawOpen": joy})
     state = FaceState({"face": {"jawOpen": 0.5}}, {"jawOpen": 0.25})

@@ -32,14 +32,14 @@ def test_the_example_loads(tmp_path: Path) -> None:
     assert timeline.sample([0.8])["head.pitch"] > np.radians(4)
 
 
-def test_all_regions_and_parameters_are_told() -> None:
+def test_all_regions_and_parameters_are_documented() -> None:
     for region in REGIONS:
         assert f"`{region}`" in PAGE
     for parameter in PARAMETERS:
         assert f"| {parameter.number} {parameter.name} |" in PAGE
 
 
-def test_generators_are_told_with_their_defaults() -> None:
+def test_generators_are_documented_with_their_defaults() -> None:
     for kind, made in GENERATORS.items():
         row = next(line for line in PAGE.splitlines() if line.startswith(f"| `{kind}`"))
         for item in fields(made):

@@ -21,7 +21,7 @@ from tracks import random_track, track_of
 TIMELINE = Timeline(0.5, tracks={"units.jawOpen": constant(0.25)})
 
 
-def test_documents_and_recordings_are_told_apart(tmp_path: Path) -> None:
+def test_documents_and_recordings_are_distinguished(tmp_path: Path) -> None:
     save_timeline(tmp_path / "a.JSON", TIMELINE)
     save_live_link(tmp_path / "a.csv", moments(TIMELINE))
     for name in ("a.JSON", "a.csv"):

@@ -49,7 +49,7 @@ FULL = Timeline(
 )
 
 
-def test_a_timeline_comes_back(tmp_path: Path) -> None:
+def test_a_timeline_round_trips(tmp_path: Path) -> None:
     save_timeline(tmp_path / "a.json", FULL)
     loaded = load_timeline_json(tmp_path / "a.json")
     times = np.linspace(-1, 5, 301)

@@ -37,7 +37,7 @@ def assert_same_frame(found: TrackedFrame, given: TrackedFrame, tolerance: float
 
 
 @pytest.mark.parametrize("layout", [LAYOUT, NEUTRAL_ONLY, BARE], ids=["all", "neutral", "bare"])
-def test_a_track_comes_back(tmp_path: Path, rng: np.random.Generator, layout: Layout) -> None:
+def test_a_track_round_trips(tmp_path: Path, rng: np.random.Generator, layout: Layout) -> None:
     track = random_track(rng, layout=layout)
     save_track(tmp_path / "TRACK.csv", track)
     found = load_track(tmp_path / "TRACK.csv")
@@ -92,7 +92,7 @@ def test_what_is_not_finite_is_an_empty_cell(tmp_path: Path, rng: np.random.Gene
     assert np.flatnonzero(np.isnan(found)).tolist() == [3]
 
 
-def test_a_track_without_frames_comes_back(tmp_path: Path) -> None:
+def test_a_track_without_frames_round_trips(tmp_path: Path) -> None:
     track = Track(LAYOUT, 8, 8, 9.0, 25.0, ())
     save_track(tmp_path / "a.csv", track)
     assert load_track(tmp_path / "a.csv") == track
@@ -170,7 +170,7 @@ BAD_SIDECARS = [
 
 
 @pytest.mark.parametrize(("change", "message"), BAD_SIDECARS)
-def test_bad_sidecars_are_told_in_one_line(
+def test_bad_sidecars_raise_one_line_errors(
     tmp_path: Path, rng: np.random.Generator, change: dict, message: str
 ) -> None:
     path = written(tmp_path, rng)
@@ -202,7 +202,7 @@ def test_another_file_of_the_sidecars_name_is_kept(
     check_track_place(tmp_path / "older" / "a.csv")
 
 
-def test_tracks_are_told_by_their_first_line(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_tracks_are_known_by_their_first_line(tmp_path: Path, rng: np.random.Generator) -> None:
     assert is_track(written(tmp_path, rng))
     (tmp_path / "b.csv").write_text("Timecode,BlendShapeCount\n")
     assert not is_track(tmp_path / "b.csv")

@@ -11,7 +11,7 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
 from mien.errors import InputError
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.synthesis.composition.border_padding import pad_with_blurred_border
 from mien.synthesis.composition.composer import Composer
 from mien.synthesis.examples.example_set import Example, ExampleSet
@@ -68,7 +68,7 @@ def same_everywhere(example_set, row):
 
 
 def similarity(a, b, x, y):
-    return PlanarMotion(np.array(a), np.array(b), np.array([x, y], float))
+    return PlanarSimilarity(np.array(a), np.array(b), np.array([x, y], float))
 
 
 def grown(mask, by):

@@ -10,10 +10,10 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import Subregions
 from mien.errors import InputError
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
-TURNED = PlanarMotion(np.array(0.9), np.array(0.1), np.array([7.0, -3.0]))
+TURNED = PlanarSimilarity(np.array(0.9), np.array(0.1), np.array([7.0, -3.0]))
 PHOTO = np.zeros((120, 100, 3), np.uint8)
 
 

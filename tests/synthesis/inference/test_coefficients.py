@@ -11,7 +11,7 @@ from hull import hull_distances
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import Subregions, default_subregions
 from mien.errors import InputError
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.synthesis.examples.example_set import Example, ExampleSet
 from mien.synthesis.inference.coefficients import (
     BROWS,
@@ -22,7 +22,7 @@ from mien.synthesis.inference.coefficients import (
 )
 
 PHOTO = np.zeros((30, 20, 3), np.uint8)
-MOVED = PlanarMotion(np.array(1.2), np.array(0.1), np.array([3.0, 8.0]))
+MOVED = PlanarSimilarity(np.array(1.2), np.array(0.1), np.array([3.0, 8.0]))
 
 
 @pytest.fixture(scope="module")

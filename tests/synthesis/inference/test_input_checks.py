@@ -10,7 +10,7 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
 from mien.errors import EstimationError, InputError
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.synthesis.examples.example_set import Example, ExampleSet
 from mien.synthesis.inference.input_checks import (
     MIN_STATISTICS,
@@ -23,7 +23,7 @@ from mien.synthesis.inference.input_checks import (
 
 WIDTH, HEIGHT = 160, 200
 FACE = 100.0
-MOVED = PlanarMotion(np.array(1.1), np.array(0.15), np.array([-20.0, 4.0]))
+MOVED = PlanarSimilarity(np.array(1.1), np.array(0.15), np.array([-20.0, 4.0]))
 
 
 @pytest.fixture(scope="module")

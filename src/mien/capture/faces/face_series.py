@@ -25,11 +25,11 @@ from mien.capture.video.orientation import turn_upright
 from mien.capture.video.video import Video
 from mien.errors import EstimationError, InputError
 from mien.progress import StepProgress
-from mien.reading.names import plain_name
+from mien.reading.names import portable_name
 
-__all__ = ["FaceSeries", "Look", "find_faces", "load_pictures", "row_of", "rows_of"]
+__all__ = ["FaceSeries", "PictureCallback", "find_faces", "load_pictures", "row_of", "rows_of"]
 
-Look = Callable[[UInt8[Array, "h w 3"], Float[Array, "478 2"]], None]
+PictureCallback = Callable[[UInt8[Array, "h w 3"], Float[Array, "478 2"]], None]
 """Told of each picture that shows a face, in the series' order, and where its landmarks are."""
 
 
@@ -78,7 +78,7 @@ def find_faces(
     max_side: int,
     kind: SourceKind | None = None,
     face: int | None = None,
-    look: Look | None = None,
+    look: PictureCallback | None = None,
     report: StepProgress | None = None,
 ) -> FaceSeries:
     """The face in every photo of a folder or in every frame of a video.
@@ -129,7 +129,7 @@ def load_pictures(
 class _Gathered:
     """What was found so far."""
 
-    def __init__(self, source: Path, max_side: int, look: Look) -> None:
+    def __init__(self, source: Path, max_side: int, look: PictureCallback) -> None:
         self.source, self.max_side, self.look = source, max_side, look
         self.is_video = False
         self.files: list[Path] = []
@@ -161,7 +161,7 @@ class _Gathered:
                     self._add(frame_name(picture.frame), picture.frame, picture.pixels, found)
                 if report is not None:
                     report(picture.frame + 1, max(total, picture.frame + 1))
-        name = plain_name(self.source)
+        name = portable_name(self.source)
         self.notes += [f"{name}: {note}" for note in (*video.notes, *odd.notes)]
 
     def read_photos(
@@ -175,7 +175,9 @@ class _Gathered:
         for folder, paths in folders.items():
             self.notes += orphaned_annotations(paths)
             for path in paths:
-                name = plain_name(path) if len(folders) == 1 else f"{folder}/{plain_name(path)}"
+                name = (
+                    portable_name(path) if len(folders) == 1 else f"{folder}/{portable_name(path)}"
+                )
                 self._add_photo(name, number, path, detector, face)
                 number += 1
                 if report is not None:

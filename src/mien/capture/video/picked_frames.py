@@ -11,8 +11,7 @@ from mien.arrays import Array, Int, check_positive
 from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.faces.mediapipe_face import DetectedFace
 from mien.capture.faces.sharpness import face_sharpness
-from mien.capture.folder import NEUTRAL
-from mien.capture.images.photos import MAX_SIDE, Photo, shrunk
+from mien.capture.images.photos import DEFAULT_MAX_SIDE, Photo, shrunk
 from mien.capture.video.clip_notes import ClipNotes
 from mien.capture.video.expression_selection import choose_expressions, name_expressions
 from mien.capture.video.frame_photos import fetch_frames
@@ -20,6 +19,7 @@ from mien.capture.video.frame_selection import FrameScores, choose_frames
 from mien.capture.video.orientation import turn_upright
 from mien.capture.video.video import Video
 from mien.errors import EstimationError
+from mien.head import NEUTRAL
 from mien.progress import StepProgress
 
 MAX_SAMPLES = 240
@@ -48,7 +48,7 @@ def pick_frames(
     count: int = 7,
     expressions: int | None = None,
     detector: LandmarkDetector,
-    max_side: int = MAX_SIDE,
+    max_side: int = DEFAULT_MAX_SIDE,
     progress: StepProgress | None = None,
 ) -> PickedFrames:
     """Sharp frames with diverse poses of the head at rest, and one of each other expression.

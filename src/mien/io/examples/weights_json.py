@@ -65,7 +65,7 @@ def save_coefficients(
         sources: what each example was taken from, by name.
         subregions: their names.
         coefficients: of each example in each subregion.
-        hull: how far each subregion leaves the hull, by a key that says in which unit.
+        hull: how far each subregion leaves the hull, by a key with its unit.
 
     Raises:
         InputError: shapes, NaN, the place.

@@ -215,7 +215,7 @@ def _free(path: Path) -> Path:
 
 
 def _link(source: Path, place: Path) -> None:
-    """The same file under another name; a copy where the disk knows no links."""
+    """The same file under another name; a copy where the file system has no links."""
     try:
         os.link(source, place, follow_symlinks=False)
     except (OSError, NotImplementedError):

@@ -25,7 +25,7 @@ _CONTAINER_OPTIONS = {".mp4": {"movflags": "+faststart"}, ".webm": {}}
 _TUNING = {"libvpx-vp9": {"b": "0", "cpu-used": "4", "row-mt": "1"}}
 _ALPHA_TUNING = {"auto-alt-ref": "0"}
 
-# By channels of a frame; a player that knows no alpha shows the same picture without.
+# By channels of a frame; a player without alpha shows the same picture without it.
 _PIXELS = {3: "yuv420p", 4: "yuva420p"}
 
 # FFmpeg's numbers: BT.709 for matrix, primaries and transfer; 16 to 235 for luma. Players take a

@@ -56,13 +56,13 @@ def live_link_values(moment: Moment, given: Mapping[str, float]) -> dict[str, fl
 
     Args:
         moment: the frame.
-        given: weights of the units that stand for the moment's face.
+        given: weights by unit for the moment's face.
 
     Returns:
         in the order of the file's columns; Unreal's angles, radians.
 
     Raises:
-        InputError: a unit that the format does not know.
+        InputError: a unit that the format does not have.
     """
     weights = weights_with_gaze(moment.state, given)
     yaw, pitch, roll = head_angles_rad(moment.rotation, order="YXZ")

@@ -57,15 +57,15 @@ def save_live_link(
 ) -> int:
     """Write a performance as a Live Link Face CSV, whole or not at all.
 
-    The format knows no photographed expressions and no moved head: only units, head and eye
-    angles are written. Where the eyes look is added to the EyeLook units, which is what most
+    The format has no photographed expressions and no position of the head: only units, head and
+    eye angles are written. Where the eyes look is added to the EyeLook units, which is what most
     programs read.
 
     Args:
         path: the file.
         moments: in rising time, from 0 s on.
-        units_of: the units that stand for a face; for a caller that has units for its photographed
-            expressions.
+        units_of: weights by unit for a face state; its own units unless given, which leave out
+            photographed expressions.
 
     Returns:
         how many frames were written.
@@ -268,7 +268,7 @@ def _timeline(times: Array, values: dict[str, Array]) -> Timeline:
     }
     tracks |= _head_tracks(times, [values.get(name) for name in HEAD_COLUMNS])
     fps = min(max(round(1 / step, 3), MIN_FPS), MAX_FPS)
-    # A last frame that stands for seconds would only be a still picture.
+    # A last frame that lasts seconds would only be a still picture.
     return Timeline(float(times[-1]) + min(step, 1.0), fps=fps, tracks=tracks)
 
 

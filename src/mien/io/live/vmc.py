@@ -10,7 +10,7 @@ VMagicMirror and receivers for Unity, Unreal, Godot and Blender understand. A fr
     /VMC/Ext/Blend/Apply
 
 Units are called as the clips of "perfect sync" avatars are: ARKit's names with a capital, which
-counts. Positions of bones belong to the avatar's own skeleton, which a sender cannot know: 0.
+counts. Positions of bones belong to the avatar's own skeleton, which the sender does not have: 0.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def encode_face(moment: Moment, given: Mapping[str, float]) -> bytes:
 
     Args:
         moment: the frame.
-        given: weights of the units that stand for the moment's face.
+        given: weights by unit for the moment's face.
 
     Raises:
         InputError: a unit that is not one of ARKit's 52.

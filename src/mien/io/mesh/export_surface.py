@@ -141,7 +141,7 @@ def expression_target_name(head: Head, expression: str) -> str:
 def split_at_seams(
     mesh: Mesh, triangles: Int[Array, " f"]
 ) -> tuple[Int[Array, " n"], Int[Array, " n"], Int[Array, "f 3"]]:
-    """Corners for formats that want one texture coordinate a vertex: seams are doubled.
+    """Corners for formats with one texture coordinate a vertex: vertices on seams are doubled.
 
     Returns:
         the vertex of each corner; its texture coordinate, (0,) for a mesh without; the triangles

@@ -81,7 +81,7 @@ def save_usdz(
 def _package(members: dict[str, bytes]) -> bytes:
     """A .usdz: a zip archive whose members are stored as they are, from multiples of 64 bytes on.
 
-    USD's own writer puts in the time of day; the same head shall give the same bytes.
+    USD's own writer puts in the time of day; here the same head gives the same bytes.
     """
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
@@ -121,7 +121,7 @@ def _define_mesh(stage: Any, surface: ExportSurface) -> Any:
     prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
     prim.CreateFaceVertexCountsAttr(Vt.IntArray(len(mesh.triangles), 3))
     prim.CreateFaceVertexIndicesAttr(integers(mesh.triangles))
-    # A triangle mesh is meant as it is; the default would round it off.
+    # By default USD subdivides a mesh, which would round it off.
     prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     prim.CreateDoubleSidedAttr(True)
     prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(surface.normals.astype(np.float32)))
@@ -152,7 +152,7 @@ def _define_blend_shapes(stage: Any, mesh: Any, targets: tuple[MorphTarget, ...]
     )
     binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
     binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
-    # One influence for all vertices would do by the specification; some readers want one for each.
+    # By the specification one influence for all vertices is enough; some readers need one for each.
     count = len(mesh.GetPointsAttr().Get())
     binding.CreateJointIndicesPrimvar(False, 1).Set(Vt.IntArray(count))
     binding.CreateJointWeightsPrimvar(False, 1).Set(Vt.FloatArray(count, 1.0))

@@ -40,7 +40,7 @@ def free_name(name: str, taken: Container[str]) -> str:
 
 
 def integers(indices: Array) -> Any:
-    """As USD wants them, one after the other."""
+    """A flat USD array of the indices."""
     from pxr import Vt
 
     return Vt.IntArray.FromNumpy(indices.astype(np.int32).ravel())

@@ -153,7 +153,7 @@ def save_fap(
     Args:
         path: the file.
         values: (68,) a frame, as FapMeter.read gives them.
-        fps: frames a second; the format knows whole numbers only.
+        fps: frames a second; the format has whole numbers only.
         name: of the performance; the file's own unless given.
 
     Returns:

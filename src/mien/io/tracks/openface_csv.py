@@ -82,8 +82,8 @@ def save_openface(
     Args:
         path: the file.
         track: the track.
-        units_of: the units that stand for a face; for a caller that has units for its photographed
-            expressions.
+        units_of: weights by unit for a face state; its own units unless given, which leave out
+            photographed expressions.
 
     Returns:
         how many frames were written.

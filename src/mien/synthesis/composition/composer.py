@@ -9,8 +9,8 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8, check_array, frozen
 from mien.errors import InputError
 from mien.numeric.kernels.threads import for_row_bands
-from mien.numeric.planar_similarity import PlanarMotion, estimate_planar_motion
-from mien.numeric.raster.piecewise_affine import affine_maps, facing, snapped
+from mien.numeric.planar_similarity import PlanarSimilarity, estimate_planar_similarity
+from mien.numeric.raster.piecewise_affine import affine_maps, orient_triangles, to_subpixels
 from mien.render.mipmap import packed_texels
 from mien.synthesis.composition.blend_weights import pack_blend_weights
 from mien.synthesis.composition.border_padding import pad_with_blurred_border
@@ -49,12 +49,12 @@ class Composer:
         points = [example.points for example in examples.examples]
         framed = np.stack([self._framed(own, self.head_motion(own)) for own in points])
         self._example_corners = frozen(framed)
-        template = np.concatenate([layout.template, layout.surround])
-        self._triangles = facing(layout.triangles, template)
+        template = np.concatenate([layout.template, layout.template_frame])
+        self._triangles = orient_triangles(layout.triangles, template)
         self._standard = examples.standard
         self._blend_weights = pack_blend_weights(examples.subregions.fades)
 
-    def head_motion(self, points: Float[Array, "n 2"]) -> PlanarMotion:
+    def head_motion(self, points: Float[Array, "n 2"]) -> PlanarSimilarity:
         """The head's motion from the neutral photo to another, from the rigid points.
 
         Args:
@@ -69,14 +69,14 @@ class Composer:
         """
         points = check_array("points", points, self._neutral_points.shape)
         rigid = self._layout.rigid
-        return estimate_planar_motion(self._neutral_points[rigid], points[rigid])
+        return estimate_planar_similarity(self._neutral_points[rigid], points[rigid])
 
     def render(
         self,
         points: Float[Array, "n 2"],
         coefficients: Float[Array, "r m"],
         *,
-        motion: PlanarMotion | None = None,
+        motion: PlanarSimilarity | None = None,
         size: tuple[int, int] | None = None,
         out: UInt8[Array, "h w 3"] | None = None,
     ) -> UInt8[Array, "h w 3"]:
@@ -101,7 +101,7 @@ class Composer:
         """
         points = check_array("points", points, self._neutral_points.shape)
         mixtures = self._mixtures(coefficients)
-        corners = snapped(self._framed(points, motion))
+        corners = to_subpixels(self._framed(points, motion))
         maps = frozen(affine_maps(corners, self._triangles, self._example_corners))
         out = self._background(motion, size, out)
         height, width = out.shape[:2]
@@ -114,7 +114,7 @@ class Composer:
         return out
 
     def _framed(
-        self, points: Float[Array, "n 2"], motion: PlanarMotion | None
+        self, points: Float[Array, "n 2"], motion: PlanarSimilarity | None
     ) -> Float[Array, "k 2"]:
         """All corners of the triangles: the points, and the neutral photo's frame, moved."""
         frame = self._frame if motion is None else motion(self._frame)
@@ -127,7 +127,7 @@ class Composer:
 
     def _background(
         self,
-        motion: PlanarMotion | None,
+        motion: PlanarSimilarity | None,
         size: tuple[int, int] | None,
         out: UInt8[Array, "h w 3"] | None,
     ) -> UInt8[Array, "h w 3"]:

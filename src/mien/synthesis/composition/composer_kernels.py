@@ -14,7 +14,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int
 from mien.numeric.kernels.jit import njit
 from mien.numeric.kernels.prefetch import prefetch
-from mien.numeric.raster.piecewise_affine import SUBPIXELS, cut_row, extents
+from mien.numeric.raster.piecewise_affine import SUBPIXELS, row_extents, scanline_spans
 from mien.synthesis.composition.blend_weights import WEIGHT_UNIT, BlendWeights
 
 __all__ = ["SUBTEXELS", "Mixtures", "Photos", "draw_rows"]
@@ -108,12 +108,12 @@ def draw_rows(
     memory = np.zeros(7 * _PITCH, np.uint32)
     weights = np.zeros(len(widths) * _PITCH, np.float32)
     sums = np.zeros(5 * _PITCH, np.float32)
-    tops, ends = extents(corners, triangles)
+    tops, ends = row_extents(corners, triangles)
     cuts = np.empty((len(triangles), 3), np.int64)
     starts = np.empty(2 * len(triangles) + 2, np.int64)
     spans = np.empty(2 * len(triangles) + 1, np.int64)
     for row in range(first, end):
-        count = cut_row(corners, triangles, tops, ends, row, width, cuts, starts, spans)
+        count = scanline_spans(corners, triangles, tops, ends, row, width, cuts, starts, spans)
         n, col = 0, 0
         while col < width:
             if spans[n] < 0:

@@ -13,9 +13,9 @@ from mien.arrays import Array, Float, Int
 from mien.assets.feature_points import FeatureLayout
 from mien.assets.subregions import default_subregions
 from mien.capture.faces.face_series import FaceSeries
-from mien.capture.folder import NEUTRAL
 from mien.capture.images.photos import Photo
 from mien.capture.video.frame_selection import FrameScores, choose_frames
+from mien.head import NEUTRAL
 from mien.synthesis.examples.example_set import Example, ExampleSet
 from mien.synthesis.examples.exposure import equalize_exposure
 from mien.synthesis.examples.head_alignment import align_to_neutral
@@ -112,7 +112,6 @@ def plan_examples(
     overrides: SelectionOverrides | None = None,
     rejections: Sequence[str] = (),
     count: int = COUNT,
-    min_difference: float = MIN_DIFFERENCE,
 ) -> ExamplePlan:
     """The face at rest, the one with the mouth most open, and those that differ most.
 
@@ -123,7 +122,6 @@ def plan_examples(
         overrides: the user's choices.
         rejections: why each picture cannot be an example, "" where it can; () if all can.
         count: of examples at most.
-        min_difference: times the detector's noise that an example must differ by from all others.
 
     Raises:
         InputError: as choose_examples.
@@ -144,7 +142,7 @@ def plan_examples(
         list(zip(regions.names, regions.members, strict=True)),
         neutral,
         count=count,
-        min_distance=min_difference * DETECTOR_NOISE * _width(points[neutral]),
+        min_distance=MIN_DIFFERENCE * DETECTOR_NOISE * _width(points[neutral]),
         required=required,
         exclude=overrides.exclude,
     )

@@ -14,7 +14,7 @@ from mien.synthesis.examples.brow_correction import correct_brows
 __all__ = ["ROTATIONS_DEG", "averaged_points"]
 
 ROTATIONS_DEG = (0.0, 6.0, -6.0)
-"""In the image plane; each is used as it is and mirrored."""
+"""In the image plane; each is used as it is and mirrored. A detection takes some 10 ms."""
 
 _SIDE, _WIDTHS = 512, 3.0
 """Of a crop: px, and widths of the face. Tighter crops are noisier."""
@@ -27,8 +27,6 @@ def averaged_points(
     detector: LandmarkDetector,
     pixels: UInt8[Array, "h w 3"],
     landmarks: Float[Array, "478 2"],
-    *,
-    rotations: tuple[float, ...] = ROTATIONS_DEG,
 ) -> Float[Array, "n 2"]:
     """The mean of detections in rotated and mirrored copies of a picture, brows corrected.
 
@@ -42,7 +40,6 @@ def averaged_points(
         detector: of landmarks.
         pixels: (h, w, 3) sRGB.
         landmarks: (478, 2) px, from a single detection.
-        rotations: degrees, each as it is and mirrored; one detection takes some 10 ms.
 
     Returns:
         (n, 2) px; from the single detection where no other finds the face.
@@ -62,7 +59,7 @@ def averaged_points(
     scale = np.array(small.shape[1::-1]) / pixels.shape[1::-1]
     detections = [
         _detected(layout, detector, small, scale * single, np.radians(angle), mirrored) / scale
-        for angle in rotations
+        for angle in ROTATIONS_DEG
         for mirrored in (False, True)
     ]
     # Another face may be larger in a crop than this one.

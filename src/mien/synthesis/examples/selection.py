@@ -21,7 +21,7 @@ DETECTOR_NOISE = 0.001
 0.0003 to 0.0014 on four clips (root mean square, second differences, the calmest tenth)."""
 
 MAX_TURN = float(np.radians(25))
-"""Yaw or pitch away from neutral from which parts of the face are hidden."""
+"""Radians of yaw or pitch away from neutral, from which on parts of the face are hidden."""
 
 _MIN_SHARPNESS = 0.5
 """Of the median sharpness; frames below are blurred."""
@@ -58,12 +58,11 @@ class ExampleCandidates:
             if texts and len(texts) != count:
                 raise InputError(name, f"one for each of {count} candidates", len(texts))
 
-    def all_rejections(self, neutral: int, max_turn: float = MAX_TURN) -> list[str]:
+    def all_rejections(self, neutral: int) -> list[str]:
         """The reason why each cannot be an example, also by pose and sharpness; "" where it can.
 
         Args:
             neutral: row of the face at rest.
-            max_turn: yaw or pitch away from neutral, radians.
         """
         turned = np.abs(self.pose - self.pose[neutral]).max(axis=1)
         median = float(np.median(self.sharpness))
@@ -72,7 +71,7 @@ class ExampleCandidates:
         known = self.rejections or ("",) * len(self.geometries)
         return [
             reason
-            or (f"turned away by {np.degrees(turn):.0f} degrees" if turn > max_turn else "")
+            or (f"turned away by {np.degrees(turn):.0f} degrees" if turn > MAX_TURN else "")
             or (f"blurred, {sharp:.0%} of the usual sharpness" * bool(sharp < _MIN_SHARPNESS))
             for turn, sharp, reason in zip(turned, relative, known, strict=True)
         ]
@@ -106,7 +105,6 @@ def choose_examples(
     *,
     count: int = COUNT,
     min_distance: float = 0.0,
-    max_turn: float = MAX_TURN,
     required: dict[int, str] | None = None,
     exclude: Sequence[int] = (),
 ) -> ExampleChoice:
@@ -123,7 +121,6 @@ def choose_examples(
             paper has 10 to 15.
         min_distance: px, root mean square over the points of a subregion; a photo that differs from
             a chosen one by less in every subregion is like it.
-        max_turn: yaw or pitch away from neutral, radians, that an example may have at most.
         required: rows that are chosen in any case, with the reason.
         exclude: rows that are not.
 
@@ -138,7 +135,7 @@ def choose_examples(
     _check_rows(total, neutral, required, exclude)
     if count < 1:
         raise InputError("count", "a number above zero", count)
-    reasons = candidates.all_rejections(neutral, max_turn)
+    reasons = candidates.all_rejections(neutral)
     for row in exclude:
         reasons[row] = "excluded"
     eligible = np.array([not reason for reason in reasons])

@@ -9,7 +9,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array
 from mien.errors import InputError
-from mien.numeric.solvers.simplex import nearest_mixture
+from mien.numeric.solvers.simplex import simplex_quadratic_program
 from mien.synthesis.examples.example_set import ExampleSet
 
 __all__ = [
@@ -167,7 +167,7 @@ def _subset_weight(squares: Float[Array, " m"], subset: Sequence[int]) -> float:
 
 def _mixture(gram: Float[Array, "m m"], distance_penalty: float, slack: float) -> Array:
     """Coefficients of the examples whose offsets have these inner products."""
-    return nearest_mixture(gram, slack=slack, penalty=distance_penalty * gram.diagonal())
+    return simplex_quadratic_program(gram, slack=slack, penalty=distance_penalty * gram.diagonal())
 
 
 def mixture_distances(
