@@ -22,15 +22,8 @@ if TYPE_CHECKING:
     from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parents[1]
-NAMESPACES = (
-    "mien",
-    "mien.track",
-    "mien.synthesis",
-    "mien.texture",
-    "mien.io",
-    "mien.rig",
-    "mien.render",
-)
+PACKAGE = ROOT / "src" / "mien"
+NAMESPACES = ("mien", *sorted(f"mien.{stub.parent.name}" for stub in PACKAGE.glob("*/__init__.pyi")))
 _RESULTS = "benchmarks/results"
 _CITATION = re.compile(r"\[(Pighin|Zhang) (2002|2006)\]")
 
