@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "mien"
-NAMESPACES = ("mien", *sorted(f"mien.{stub.parent.name}" for stub in PACKAGE.glob("*/__init__.pyi")))
+NAMESPACES = (
+    "mien",
+    *sorted(f"mien.{stub.parent.name}" for stub in PACKAGE.glob("*/__init__.pyi")),
+)
 _RESULTS = "benchmarks/results"
 _CITATION = re.compile(r"\[(Pighin|Zhang) (2002|2006)\]")
 
