@@ -8,11 +8,11 @@ import pytest
 
 from mien.assets.generic import load_generic_head
 from mien.head import Expression, FittedView, Head
-from mien.reconstruction.fit import Fit, FitOptions, fit_views
-from mien.reconstruction.outliers import Mark, PhotoFit
+from mien.reconstruction.fit import FitOptions, fit_views
+from mien.reconstruction.result import Mark, NeutralFit, PhotoFit
 from mien.render.orbit import orbit_camera
 from mien.report import ReportInput, render_report
-from mien.report.page import head_angles
+from mien.report.page import head_angles_deg
 from people import camera, person, photographed
 
 GENERIC = load_generic_head()
@@ -30,11 +30,11 @@ def report_input() -> ReportInput:
     photo = fit.photos[NAMES[0]]
     slipped = Mark("chin", np.array([5.0, 7.0]), np.array([30.0, 40.0]), True, "99 times off")
     marks = tuple(slipped if mark.name == "chin" else mark for mark in photo.marks)
-    fit = Fit(
+    fit = NeutralFit(
         fit.vertices,
         {**fit.photos, NAMES[0]: PhotoFit(photo.camera, marks)},
         fit.left_out,
-        fit.uncertainty_mm,
+        uncertainty_mm=fit.uncertainty_mm,
     )
     head = Head(
         subject="Zoë <script>",
@@ -43,7 +43,7 @@ def report_input() -> ReportInput:
             "neutral": Expression(
                 fit.vertices,
                 tuple(
-                    FittedView(name, item.camera, item.rms_px, len(item.trusted))
+                    FittedView(name, item.camera, item.rms_px, len(item.inliers))
                     for name, item in fit.photos.items()
                 ),
             )
@@ -71,7 +71,7 @@ def test_every_photo_has_its_line_and_its_picture(page: str, report_input: Repor
         (line,) = [row for row in rows if row[0] == name]
         assert line[1] == f"1000 {chr(215)} 1300"
         assert line[2] == f"{item.camera.focal_px:.0f}"
-        assert line[-2:] == [str(len(item.trusted)), f"{item.rms_px:.2f}"]
+        assert line[-2:] == [str(len(item.inliers)), f"{item.rms_px:.2f}"]
         assert f'alt="{html.escape(name)} with the mesh"' in page
 
 
@@ -85,7 +85,7 @@ def test_every_mark_has_its_line(page: str, report_input: ReportInput) -> None:
         assert {row[0] for row in rows} == {mark.name for mark in item.marks}
         shown = {row[0]: row[3:] for row in rows}
         for mark in item.marks:
-            assert shown[mark.name] == [f"{mark.distance_px:.2f}", mark.verdict or "by hand"]
+            assert shown[mark.name] == [f"{mark.distance_px:.2f}", mark.rejection or "by hand"]
         lengths = [float(row[3]) for row in rows]
         assert lengths == sorted(lengths, reverse=True)
 
@@ -126,7 +126,7 @@ def test_a_page_without_a_turntable(report_input: ReportInput) -> None:
 
 def test_angles_of_a_camera_that_goes_around() -> None:
     """A camera on the subject's right sees the head turned to its own left, and so on."""
-    yaw, pitch, roll = head_angles(camera(0))
+    yaw, pitch, roll = head_angles_deg(camera(0))
     np.testing.assert_allclose([yaw, pitch, roll], 0, atol=1e-9)
     for offset, expected in (([-300, 0, 700], (1, 0)), ([0, 300, 700], (0, 1))):
         forward = -np.array(offset) / np.linalg.norm(offset)
@@ -137,7 +137,7 @@ def test_angles_of_a_camera_that_goes_around() -> None:
         seen = type(seen)(1000, 1000, 2000.0, rotation, -rotation @ np.array(offset, float))
         np.testing.assert_allclose(seen.center, offset, atol=1e-9)
         angle = np.degrees(np.arctan2(300, 700))
-        np.testing.assert_allclose(head_angles(seen)[:2], np.array(expected) * angle, atol=1e-9)
+        np.testing.assert_allclose(head_angles_deg(seen)[:2], np.array(expected) * angle, atol=1e-9)
 
 
 def test_roll_is_towards_the_right_shoulder() -> None:
@@ -149,11 +149,11 @@ def test_roll_is_towards_the_right_shoulder() -> None:
     seen = type(seen)(*(1000, 1000, 2000.0), lean @ seen.R_cam_head, seen.t_cam_head)
     top, origin = seen.to_camera(np.array([[0.0, 100, 0], [0, 0, 0]]))
     assert top[0] < origin[0]
-    np.testing.assert_allclose(head_angles(seen), (0, 0, 20), atol=1e-9)
+    np.testing.assert_allclose(head_angles_deg(seen), (0, 0, 20), atol=1e-9)
 
 
 @pytest.mark.parametrize("angles", [(30, 0, 0), (40, 25, -15), (-100, 5, 3), (0, -60, 20)])
 def test_angles_are_those_that_render_takes(angles: tuple[float, float, float]) -> None:
     yaw, pitch, roll = np.radians(angles)
     seen = orbit_camera(-yaw, pitch, roll, width=100, height=100, vertices=GENERIC.mesh.vertices)
-    np.testing.assert_allclose(head_angles(seen), angles, atol=1e-9)
+    np.testing.assert_allclose(head_angles_deg(seen), angles, atol=1e-9)
