@@ -78,7 +78,7 @@ def rasterize(
 
 
 def empty_raster(width: int, height: int) -> Raster:
-    """A raster whose memory rasterize_rows is the first to touch: page faults cost, it has threads."""
+    """A raster whose memory rasterize_rows is the first to touch, in its threads."""
     shape = (height, width)
     ids, depth = np.empty(shape, np.int32), np.empty(shape, np.float32)
     return Raster(ids, np.empty((*shape, 3), np.float32), depth)
