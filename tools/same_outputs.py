@@ -5,9 +5,9 @@
     python -m tools.same_outputs compare BEFORE AFTER
 
 `make` runs every command that writes something, each on what the ones before it made, twice: a run
-that compiles kernels rounds otherwise than one that loads them. `compare` prints a Markdown table, a row a command: files that are the same to
-the byte, files whose content is the same (frames of videos, values of arrays and tables), and by
-how much the others differ.
+that compiles kernels rounds otherwise than one that loads them. `compare` prints a Markdown table,
+a row a result: files that are the same to the byte, files whose content is the same (frames of
+videos, values of arrays and tables), and by how much the others differ.
 """
 
 from __future__ import annotations
