@@ -138,7 +138,8 @@ INTRO = (
     "Distance from the face of the fitted head, as the photos see it, to the nearest point of a "
     "scan of the same person, in mm, after ICP by a similarity (the worst 5 % are dropped while "
     "aligning, none here). The unfitted generic head is measured at the same places of its mesh "
-    "in the same way. Camera errors are medians over the photos. How and why: docs/accuracy.md."
+    "in the same way. Camera errors are medians over the photos. How and why: "
+    "docs/notes/accuracy.md."
 )
 BEFORE = (
     "ICP flatters: it slides a head to where it fits. This is before it, with the similarity that "

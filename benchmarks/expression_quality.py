@@ -16,14 +16,13 @@ import numpy as np
 
 from benchmarks.expression_quality_clips import (
     FilmedFace,
-    Likeness,
     chosen_rows,
     example_set,
     face_mask,
     filmed,
     held_out,
-    likeness,
-    steadied,
+    picture_quality,
+    with_averaged_points,
 )
 from benchmarks.expression_quality_report import MIEN, NEAREST, NEUTRAL, Found, Report
 from benchmarks.table import write_results
@@ -37,11 +36,11 @@ from mien.synthesis.examples.example_set import ExampleSet
 from mien.synthesis.examples.selection import COUNT
 from mien.synthesis.inference.coefficients import BROWS, UPPER_FACE, coefficients
 
-Shares = Callable[[ExampleSet, Array], Array]
-"""A set and points, px: each subregion's shares of its examples."""
+Mixing = Callable[[ExampleSet, Array], Array]
+"""From examples and points, px, to the coefficients of each subregion."""
 
 SHEET_ROWS = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Frames of a sheet: which share of all gain less."""
+"""Frames of a sheet: quantiles of the gain."""
 SHIPPED = ("cap12", "cap13")
 """Clips whose pictures may be shown (data/README.md of the development data)."""
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
@@ -49,33 +48,33 @@ _GAP, _MARGIN, _SMALL = 4, 0.12, 200
 
 
 def neutral_alone(examples: ExampleSet, points: Array) -> Array:
-    """What expression mapping that moves points alone has."""
+    """The neutral photo alone, as in expression mapping that only moves points."""
     return _one(examples, 0)
 
 
 def nearest_alone(examples: ExampleSet, points: Array) -> Array:
-    """The example whose points, head motion taken out, are nearest to these."""
-    apart = examples.geometries - examples.geometry(points)
-    return _one(examples, int((apart**2).sum(axis=(1, 2)).argmin()))
+    """The example whose points, head motion compensated, are nearest to these."""
+    offsets = examples.geometries - examples.geometry(points)
+    return _one(examples, int((offsets**2).sum(axis=(1, 2)).argmin()))
 
 
 def _one(examples: ExampleSet, row: int) -> Array:
-    shares = np.zeros((len(examples.subregions.names), len(examples.examples)))
-    shares[:, row] = 1
-    return shares
+    result = np.zeros((len(examples.subregions.names), len(examples.examples)))
+    result[:, row] = 1
+    return result
 
 
-def _with(**options: Any) -> Shares:
+def _with(**options: Any) -> Mixing:
     return lambda examples, points: coefficients(examples, points, **options)
 
 
 EYES = tuple(name for name in UPPER_FACE if name not in BROWS)
-COMPARED: Mapping[str, Shares] = {
+COMPARED: Mapping[str, Mixing] = {
     NEUTRAL: neutral_alone,
     NEAREST: nearest_alone,
     MIEN: coefficients,
 }
-SWITCHES: Mapping[str, Shares] = {
+SWITCHES: Mapping[str, Mixing] = {
     "as mien does it by default": coefficients,
     "the paper's: no penalty, each subregion for itself": _with(distance_penalty=0.0, tied=()),
     "penalty 0.02": _with(distance_penalty=0.02),
@@ -99,34 +98,38 @@ class Size(NamedTuple):
 
 @dataclass(frozen=True)
 class Trial:
-    """Frames of a clip that no example is from or near to, to be drawn from their points."""
+    """Frames of a clip that are not near to any example's, to be drawn from their points."""
 
     face: FilmedFace
     rows: tuple[int, ...]
     examples: ExampleSet
     composer: Composer
 
-    def drawn(self, row: int, shares: Shares) -> UInt8[Array, "h w 3"]:
-        """A frame's expression, in the frame's place."""
+    def drawn(self, row: int, mixing: Mixing) -> UInt8[Array, "h w 3"]:
+        """A frame's expression, drawn with the frame's head pose."""
         points = self.face.points[row]
         motion = self.composer.head_motion(points)
-        return self.composer.render(points, shares(self.examples, points), motion=motion)
+        return self.composer.render(points, mixing(self.examples, points), motion=motion)
 
-    def measured(self, shares: Shares) -> Float[Array, "f 3"]:
+    def measured(self, mixing: Mixing) -> Float[Array, "f 3"]:
         """PSNR, SSIM and detail of each frame."""
-        found = [self._likeness(row, shares) for row in self.rows]
-        return np.array([(like.psnr, like.ssim, like.detail) for like in found])
-
-    def _likeness(self, row: int, shares: Shares) -> Likeness:
-        return likeness(self.drawn(row, shares), self.face.frames[row], face_mask(self.face, row))
+        results = [
+            picture_quality(
+                self.drawn(row, mixing), self.face.frames[row], face_mask(self.face, row)
+            )
+            for row in self.rows
+        ]
+        return np.array([(quality.psnr, quality.ssim, quality.detail) for quality in results])
 
     def sheet(self, rows: Sequence[int]) -> UInt8[Array, "h w 3"]:
         """[Zhang 2006]'s Figs. 10 and 11: frame, neutral warped, nearest example warped, result."""
         lines = []
         for row in rows:
             window = _window(self.face, row)
-            cells = [self.face.frames[row], *(self.drawn(row, way) for way in COMPARED.values())]
-            lines.append(_joined([_cut(cell, window) for cell in cells], axis=1))
+            drawn = [self.drawn(row, mixing) for mixing in COMPARED.values()]
+            lines.append(
+                _joined([_cut(cell, window) for cell in (self.face.frames[row], *drawn)], axis=1)
+            )
         return _joined(lines, axis=0)
 
 
@@ -134,13 +137,15 @@ def trial(face: FilmedFace, detector: LandmarkDetector | None, size: Size, *, od
     """Examples from every other stretch of a clip, held-out frames from the stretches between.
 
     Args:
-        detector: looks several times at each of these frames; none: the single look stays.
+        face: the clip.
+        detector: for averaged points in these frames; None: points of single detections.
+        size: how many examples and frames.
         odd: examples from the odd stretches.
     """
     chosen = chosen_rows(face, size.examples, odd=odd)
     rows = tuple(held_out(face, size.frames, odd=odd))
     if detector is not None:
-        face = steadied(face, [*chosen, *rows], detector)
+        face = with_averaged_points(face, [*chosen, *rows], detector)
     examples = example_set(face, chosen)
     return Trial(face, rows, examples, Composer(examples))
 
@@ -184,8 +189,8 @@ def write_sheet(path: Path, tried: Trial, found: Found) -> None:
 
 
 def switches(tried: Trial, single: Trial, base: Array) -> dict[str, tuple[Array, Array]]:
-    """What each gives, and the warp of neutral beside it."""
-    found = {way: (tried.measured(shares), base) for way, shares in SWITCHES.items()}
+    """Results of each option, and of the warp of neutral beside it."""
+    found = {name: (tried.measured(mixing), base) for name, mixing in SWITCHES.items()}
     found[SINGLE] = (single.measured(coefficients), single.measured(neutral_alone))
     return found
 
@@ -199,7 +204,7 @@ def run(asked: argparse.Namespace, paths: Mapping[str, Path]) -> Report:
             size = Size(asked.examples, asked.frames)
             for blocks in ("odd", "even"):
                 tried = trial(face, detector, size, odd=blocks == "odd")
-                found = {way: tried.measured(shares) for way, shares in COMPARED.items()}
+                found = {label: tried.measured(mixing) for label, mixing in COMPARED.items()}
                 counts = (len(tried.examples.examples), len(tried.rows))
                 report.compare(name, blocks, counts, found)
                 if blocks == "even":

@@ -1,4 +1,4 @@
-"""Filmed faces parted into examples and held-out frames, and how near a picture comes to one."""
+"""Filmed faces split into examples and held-out frames, and the quality of a drawn frame."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.faces.mediapipe_face import yaw_pitch
 from mien.capture.faces.sharpness import face_sharpness
 from mien.capture.video.video import Video
+from mien.synthesis.examples.example_plan import TEETH_GAP, lip_gaps
 from mien.synthesis.examples.example_set import Example, ExampleSet
 from mien.synthesis.examples.head_alignment import align_to_neutral
 from mien.synthesis.examples.landmark_averaging import averaged_points
@@ -22,20 +23,18 @@ from mien.synthesis.examples.selection import ExampleCandidates, choose_examples
 
 __all__ = [
     "FilmedFace",
-    "Likeness",
+    "PictureQuality",
     "chosen_rows",
     "example_set",
     "face_mask",
     "filmed",
     "held_out",
-    "likeness",
-    "steadied",
+    "picture_quality",
+    "with_averaged_points",
 ]
 
 BLOCK = 15
-"""Frames that stay together, so that no held-out frame has its neighbour among the examples."""
-TEETH_GAP = 0.03
-"""Gap of the lips, in widths of the face, from which on teeth can be seen between them."""
+"""Frames that are not split, so that no held-out frame has its neighbour among the examples."""
 _MESH_LANDMARKS = 468
 
 
@@ -62,10 +61,8 @@ class FilmedFace:
 
     @property
     def lip_gaps(self) -> Float[Array, " N"]:
-        """How far the lips are apart, in widths of the face."""
-        upper, lower = (self.layout.index(f"{lip}_lip_inner") for lip in ("upper", "lower"))
-        apart = np.linalg.norm(self.points[:, upper] - self.points[:, lower], axis=1)
-        return apart / np.ptp(self.points[..., 0], axis=1)
+        """Distance of the lips, in widths of the face."""
+        return lip_gaps(self.layout, self.points) / np.ptp(self.points[..., 0], axis=1)
 
 
 def filmed(clip: Path, layout: FeatureLayout, detector: LandmarkDetector) -> FilmedFace:
@@ -85,14 +82,16 @@ def filmed(clip: Path, layout: FeatureLayout, detector: LandmarkDetector) -> Fil
         frames=tuple(frames),
         index=np.array(index),
         landmarks=landmarks,
-        points=layout.mixes @ landmarks,
+        points=layout.landmark_weights @ landmarks,
         pose=np.array([yaw_pitch(face.R_cam_head) for face in faces]),
         sharpness=np.array(sharpness),
     )
 
 
-def steadied(face: FilmedFace, rows: Collection[int], detector: LandmarkDetector) -> FilmedFace:
-    """The same with steady points in some frames, which several looks at each have found."""
+def with_averaged_points(
+    face: FilmedFace, rows: Collection[int], detector: LandmarkDetector
+) -> FilmedFace:
+    """The same with points averaged over several detections in some frames."""
     points = face.points.copy()
     for row in rows:
         frame, landmarks = face.frames[row], face.landmarks[row]
@@ -104,7 +103,7 @@ def chosen_rows(face: FilmedFace, count: int, *, odd: bool) -> list[int]:
     """Rows of the examples from the odd blocks, or the even ones, chosen as mien chooses them."""
     rows = np.flatnonzero((face.index // BLOCK % 2 == 1) == odd)
     points = face.points[rows]
-    neutral = _at_rest(points, face.lip_gaps[rows])
+    neutral = _neutral_row(points, face.lip_gaps[rows])
     geometries, _ = align_to_neutral(points, points[neutral])
     shapes = default_subregions(face.layout, points[neutral], (1, 1))
     regions = list(zip(shapes.names, shapes.members, strict=True))
@@ -130,15 +129,17 @@ def example_set(face: FilmedFace, rows: Sequence[int]) -> ExampleSet:
 
 
 def held_out(face: FilmedFace, count: int, *, odd: bool, skip: int = 0) -> list[int]:
-    """So many rows at even distances of the blocks that no example is from.
+    """Evenly spaced rows of the blocks without examples.
 
     Args:
-        odd: the blocks that examples are from.
-        skip: 0 to 1, how far between two of them each begins.
+        face: the clip.
+        count: of the rows.
+        odd: the examples are from the odd blocks.
+        skip: 0 to 1, offset in units of the spacing.
     """
     rows = np.flatnonzero((face.index // BLOCK % 2 == 1) != odd)
-    places = (np.arange(count) + 0.5 * skip) * len(rows) / count
-    return [int(row) for row in rows[np.unique(places.astype(int))]]
+    positions = (np.arange(count) + 0.5 * skip) * len(rows) / count
+    return [int(row) for row in rows[np.unique(positions.astype(int))]]
 
 
 def face_mask(face: FilmedFace, row: int) -> Bool[Array, "h w"]:
@@ -152,14 +153,14 @@ def face_mask(face: FilmedFace, row: int) -> Bool[Array, "h w"]:
 
 
 @dataclass(frozen=True)
-class Likeness:
-    """How near a picture comes to the true one, over a mask.
+class PictureQuality:
+    """Similarity of a picture to the true one, over a mask.
 
     Attributes:
         psnr: dB.
         ssim: of brightness, windows of 11 px.
-        detail: deviation of what is finer than 2 px, in shares of the true picture's: 1 is as
-            sharp, less is blurred.
+        detail: standard deviation of what is finer than 2 px, relative to the true picture's: 1
+            is as sharp, less is blurred.
     """
 
     psnr: float
@@ -167,22 +168,22 @@ class Likeness:
     detail: float
 
 
-def likeness(
+def picture_quality(
     picture: UInt8[Array, "h w 3"], truth: UInt8[Array, "h w 3"], mask: Bool[Array, "h w"]
-) -> Likeness:
-    """PSNR, SSIM (Wang et al. 2004) and how much fine detail there is."""
+) -> PictureQuality:
+    """PSNR, SSIM (Wang et al. 2004) and the amount of fine detail."""
     squared = (picture[mask].astype(float) - truth[mask]) ** 2
     pair = [_grey(image) for image in (picture, truth)]
     means = [_blurred(image) for image in pair]
     variances = [_blurred(g * g) - m * m for g, m in zip(pair, means, strict=True)]
     shared = _blurred(pair[0] * pair[1]) - means[0] * means[1]
     bright, contrast = (0.01 * 255) ** 2, (0.03 * 255) ** 2
-    above = (2 * means[0] * means[1] + bright) * (2 * shared + contrast)
-    below = (means[0] ** 2 + means[1] ** 2 + bright) * (sum(variances) + contrast)
+    numerator = (2 * means[0] * means[1] + bright) * (2 * shared + contrast)
+    denominator = (means[0] ** 2 + means[1] ** 2 + bright) * (sum(variances) + contrast)
     fine = [float((image - mean)[mask].std()) for image, mean in zip(pair, means, strict=True)]
-    return Likeness(
+    return PictureQuality(
         psnr=float(10 * np.log10(255**2 / max(squared.mean(), 1e-9))),
-        ssim=float((above / below)[mask].mean()),
+        ssim=float((numerator / denominator)[mask].mean()),
         detail=fine[0] / fine[1],
     )
 
@@ -199,12 +200,12 @@ def _blurred(image: Float[Array, "h w"]) -> Float[Array, "h w"]:
     return np.asarray(cv2.GaussianBlur(image, (11, 11), 1.5))
 
 
-def _at_rest(points: Float[Array, "N n 2"], gaps: Float[Array, " N"]) -> int:
+def _neutral_row(points: Float[Array, "N n 2"], gaps: Float[Array, " N"]) -> int:
     """The frame that is nearest to the median one and whose mouth is not open."""
     geometries, _ = align_to_neutral(points, points[0])
     width = float(np.ptp(np.median(geometries, axis=0)[:, 0]))
-    apart = np.linalg.norm(geometries - np.median(geometries, axis=0), axis=(1, 2)) / width
-    return int((apart + 3 * gaps).argmin())
+    distances = np.linalg.norm(geometries - np.median(geometries, axis=0), axis=(1, 2)) / width
+    return int((distances + 3 * gaps).argmin())
 
 
 def _example(face: FilmedFace, row: int) -> Example:

@@ -32,9 +32,9 @@ from mien.synthesis.synthesizer import SynthesisOptions
 from mien.track.lens import expected_focal
 from mien.track.state import Track, TrackedFrame
 
-APART = 5
-"""Frames so near to one that the head was made from are not looked at."""
-LOOKED_AT = 60
+MIN_GAP = 5
+"""Frames nearer to one that the head was made from are not measured."""
+MEASURED = 60
 EXPRESSIONS = 25
 """The most different ones, completed from a few points."""
 
@@ -42,7 +42,7 @@ NEUTRAL, NEAREST = "neutral's texture", "the nearest expression's"
 SYNTHESISED = "synthesised"
 BY_PAPER = "synthesised as [Zhang 2006] prints it"
 BY_REGIONS = "[Pighin 2002]'s regions, by the tracker"
-Making = Callable[[PosedFace, Array], PosedFace]
+Variant = Callable[[PosedFace, Array], PosedFace]
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def tracked(head: Head, clip: Path, detector: LandmarkDetector) -> Tracked:
     free = [
         found
         for found in track.frames
-        if found.state is not None and min(abs(found.frame - index) for index in own) >= APART
+        if found.state is not None and min(abs(found.frame - index) for index in own) >= MIN_GAP
     ]
     synthesizer = HeadSynthesizer(head)
     states = [found.state.face(track.layout) for found in free if found.state is not None]
@@ -86,8 +86,8 @@ def tracked(head: Head, clip: Path, detector: LandmarkDetector) -> Tracked:
     return Tracked(head, synthesizer, track, kept, tuple(free), faces, points)
 
 
-def makings(clip: Tracked) -> Mapping[str, Making]:
-    """What is compared: the first three have the tracked shape, and differ in texture alone."""
+def variants(clip: Tracked) -> Mapping[str, Variant]:
+    """Faces that are compared: the tracked shapes with other textures, and synthesised ones."""
     rig = clip.synthesizer.rig
     paper = HeadSynthesizer(clip.head, SynthesisOptions.paper(), warp=False, rig=rig)
 
@@ -97,8 +97,8 @@ def makings(clip: Tracked) -> Mapping[str, Making]:
         return PosedFace(face.vertices, weights, face.brightness)
 
     def nearest(face: PosedFace, points: Array) -> PosedFace:
-        apart = ((clip.synthesizer.examples - points) ** 2).sum(axis=(1, 2))
-        return one(int(apart.argmin()), face)
+        squares = ((clip.synthesizer.examples - points) ** 2).sum(axis=(1, 2))
+        return one(int(squares.argmin()), face)
 
     return {
         NEUTRAL: lambda face, points: one(0, face),
@@ -109,28 +109,28 @@ def makings(clip: Tracked) -> Mapping[str, Making]:
     }
 
 
-def likenesses(clip: Tracked) -> dict[str, Float[Array, " f"]]:
+def psnrs(clip: Tracked) -> dict[str, Float[Array, " f"]]:
     """PSNR over the face of evenly chosen frames, dB."""
     renderer = HeadRenderer(clip.head, rig=clip.synthesizer.rig)
-    rows = np.linspace(0, len(clip.frames) - 1, LOOKED_AT).astype(int)
-    likeness: dict[str, list[float]] = {}
+    rows = np.linspace(0, len(clip.frames) - 1, MEASURED).astype(int)
+    quality: dict[str, list[float]] = {}
     for row in rows:
         found, face = clip.found[row], clip.faces[row]
         assert found.state is not None
         camera = clip.track.camera(found.state)
         inside = face_pixels(clip.head.mesh.with_vertices(face.vertices), camera)
-        for name, make in makings(clip).items():
+        for name, make in variants(clip).items():
             drawn = renderer.draw_posed(make(face, clip.points[row]), camera)
             matched = np.clip(drawn[..., :3] * found.gain + found.bias, 0, 255).astype(np.uint8)
             mask = inside & (drawn[..., 3] == 255)
-            likeness.setdefault(name, []).append(face_psnr(clip.frames[row], matched, mask))
-    return {name: np.array(values) for name, values in likeness.items()}
+            quality.setdefault(name, []).append(face_psnr(clip.frames[row], matched, mask))
+    return {name: np.array(values) for name, values in quality.items()}
 
 
-def likeness_row(name: str, clip: Tracked) -> list[object]:
-    """Medians, gains over neutral's texture, and what leaves the hull."""
-    psnr = likenesses(clip)
-    gains = [float(np.median(psnr[way] - psnr[NEUTRAL])) for way in (NEAREST, SYNTHESISED)]
+def psnr_row(name: str, clip: Tracked) -> list[object]:
+    """Medians, gains over neutral's texture, and distances from the hull."""
+    psnr = psnrs(clip)
+    gains = [float(np.median(psnr[label] - psnr[NEUTRAL])) for label in (NEAREST, SYNTHESISED)]
     made = [
         clip.synthesizer.synthesize(points) for points in clip.points[:: len(clip.points) // 20]
     ]
@@ -153,8 +153,8 @@ def completion_rows(name: str, clip: Tracked) -> list[list[object]]:
         unknown = np.setdiff1d(np.arange(len(rest)), known)
         row: list[object] = [f"{name}, {count} points"]
         row.append(float(np.linalg.norm(chosen - rest, axis=2)[:, unknown].mean()))
-        for way in (synthesizer, printed):
-            made = np.stack([way.complete(known, points[known]) for points in chosen])
+        for variant in (synthesizer, printed):
+            made = np.stack([variant.complete(known, points[known]) for points in chosen])
             row.append(float(np.linalg.norm(made - chosen, axis=2)[:, unknown].mean()))
         rows.append(row)
     return rows
@@ -176,24 +176,24 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("heads", type=Path, help="HEADS/NAME: heads built of frames of the clips")
     parser.add_argument("clips", nargs="*", default=["d10", "d6"], metavar="NAME[=CLIP]")
     given = parser.parse_args(arguments)
-    likeness: list[list[object]] = []
+    quality: list[list[object]] = []
     completion: list[list[object]] = []
     times = []
     with LandmarkDetector() as detector:
         for entry in given.clips:
             name, _, path = entry.partition("=")
             clip = tracked(load_head(given.heads / name), Path(path or CLIPS[name]), detector)
-            likeness.append(likeness_row(name, clip))
+            quality.append(psnr_row(name, clip))
             completion += completion_rows(name, clip)
             times.append(milliseconds(clip))
-    ways = (NEUTRAL, NEAREST, SYNTHESISED, BY_PAPER, BY_REGIONS)
+    names = (NEUTRAL, NEAREST, SYNTHESISED, BY_PAPER, BY_REGIONS)
     gains = ("gain of the nearest", "gain of synthesis")
-    header = ("", "frames", *ways, *gains, "left of the hull, mm: median", "greatest")
+    header = ("", "frames", *names, *gains, "left of the hull, mm: median", "greatest")
     parts = [
         "PSNR over the face against frames that the head was not made from, dB, medians over "
-        f"{LOOKED_AT} of them. Shapes are the tracker's, in the columns of synthesis made again "
+        f"{MEASURED} of them. Shapes are the tracker's, in the columns of synthesis made again "
         "from their feature points.",
-        markdown_table(header, likeness),
+        markdown_table(header, quality),
         f"All points from some, in space: mean error in mm at those not given, over {EXPRESSIONS} "
         "expressions.",
         markdown_table(("", "unmoved", "closed form", "printed"), completion),

@@ -21,7 +21,7 @@ from benchmarks.scan import (
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.reconstruction.fit import Fit
 
 __all__ = ["Outcome", "cameras_by_stem", "outcome_of", "without_marks"]
@@ -81,7 +81,7 @@ def cameras_by_stem(fit: Fit) -> dict[str, Camera]:
     return {Path(name).stem: photo.camera for name, photo in fit.photos.items()}
 
 
-def without_marks(views: Sequence[View]) -> tuple[View, ...]:
+def without_marks(views: Sequence[CapturedView]) -> tuple[CapturedView, ...]:
     """The views without what was marked by hand."""
     return tuple(replace(view, annotations=None) for view in views)
 

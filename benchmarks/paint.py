@@ -1,4 +1,4 @@
-"""Colours that belong to a surface, whoever looks at it."""
+"""Colours of a surface, the same from every view."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ __all__ = ["Hits", "Paint", "ProjectedPaint", "Projector", "TexturePaint"]
 
 @dataclass(frozen=True)
 class Hits:
-    """Places on a mesh.
+    """Points on a mesh.
 
     Attributes:
         triangles: (N,) index of the triangle of each.
-        barycentrics: (N, 3) place in it.
+        barycentrics: (N, 3) coordinates in it.
     """
 
     triangles: Int[Array, " n"]
@@ -36,13 +36,13 @@ class Paint(Protocol):
     """Colours of a surface."""
 
     def __call__(self, mesh: Mesh, hits: Hits) -> Float[Array, "n 3"]:
-        """(N, 3) colours from 0 to 255 at these places of the mesh, whoever looks at them."""
+        """(N, 3) colours from 0 to 255 at these points of the mesh."""
         ...
 
 
 @dataclass(frozen=True)
 class TexturePaint:
-    """A picture laid on the surface by texture coordinates.
+    """A texture, by texture coordinates.
 
     Attributes:
         texture: (H, W, 3) uint8.
@@ -54,8 +54,8 @@ class TexturePaint:
 
     def __call__(self, mesh: Mesh, hits: Hits) -> Float[Array, "n 3"]:
         height, width = self.texture.shape[:2]
-        places = hits.of(mesh.uv_triangles, mesh.uvs) * [width, -height] + [0, height]
-        colours = sample_bilinear(self.texture, places)
+        positions = hits.of(mesh.uv_triangles, mesh.uvs) * [width, -height] + [0, height]
+        colours = sample_bilinear(self.texture, positions)
         if self.shading is not None:
             colours = colours * hits.of(mesh.triangles, self.shading[:, None])
         return colours
@@ -63,13 +63,13 @@ class TexturePaint:
 
 @dataclass(frozen=True)
 class Projector:
-    """A photo thrown back onto the surface that it shows.
+    """A photo projected back onto the surface that it shows.
 
     Attributes:
-        camera: (H, W, 3) uint8.
+        camera: of the photo.
         photo: (H, W, 3) uint8.
         depth: (H, W, 1) mm of the surface.
-        weight: (H, W, 1) how well each pixel shows it.
+        weight: (H, W, 1) blend weight of each pixel.
     """
 
     camera: Camera
@@ -89,9 +89,10 @@ class Projector:
 
 @dataclass(frozen=True)
 class ProjectedPaint:
-    """Photos thrown onto the surface from where they were taken, smoothly blended.
+    """Photos projected onto the surface from their cameras, smoothly blended.
 
     Attributes:
+        projectors: one for each photo.
         shadow: (3,) colour of what no photo shows.
     """
 

@@ -29,13 +29,13 @@ GIVEN = 17
 STEPS = (1, 2, 3, 5, 7, 10, 15, 20, 30, 40, 50)
 TARGET_PX = 1.5
 FINER = (60, 40, 30)
-"""Components that a prior can hold."""
+"""Components, with a prior."""
 IMAGE = Path(__file__).parents[1] / "docs" / "images" / "propagation.png"
 _TO_THE_END = 1e-12
 
 
 @dataclass(frozen=True)
-class Way:
+class Variant:
     """MotionPropagation with its options, and which of the layout's hierarchies it uses."""
 
     name: str
@@ -44,7 +44,7 @@ class Way:
     backwards: bool = False
 
     def made(self, layout: FeatureLayout, clip: HeldOut, iterations: int) -> DisplacementModel:
-        """That learned from a clip, to be stopped after so many iterations if not before."""
+        """Fitted to the statistics of a clip, with at most so many iterations."""
         sets = layout.sets[: self.levels]
         if self.backwards:
             sets = tuple(level[::-1] for level in sets)
@@ -56,47 +56,51 @@ class Way:
         )
 
 
-PRINTED = Way("as printed")
-HELD = Way(
+PRINTED = Variant("as printed")
+WEIGHTED = Variant(
     "with known weight 3 and prior", {"components": FINER, "known_weight": 3.0, "prior_weight": 1.0}
 )
 TRIED = (
-    *(Way(f"{c} components in every set", {"components": c}) for c in (5, 8, 10, 15, 20, 30)),
-    Way("20, 15, 15 components: the default"),
-    Way("20, 15, 15, sets in reverse order", backwards=True),
-    Way("20, 10, 5", {"components": (20, 10, 5)}),
-    Way("20, 15: hierarchies 0 and 1", levels=2),
-    Way("20: hierarchy 0", levels=1),
-    Way("20, 15, 15, known weight 3", {"known_weight": 3.0}),
-    Way("20, 15, 15, known weight 3, prior", {"known_weight": 3.0, "prior_weight": 1.0}),
-    Way("30, 20, 15, known weight 3, prior", {**HELD.options, "components": (30, 20, 15)}),
-    Way("40, 30, 20, known weight 3, prior", {**HELD.options, "components": (40, 30, 20)}),
-    replace(HELD, name="60, 40, 30, known weight 3, prior"),
-    Way("60, 40, 30, known weight 1, prior", {**HELD.options, "known_weight": 1.0}),
-    Way("60, 40, 30, known weight 10, prior", {**HELD.options, "known_weight": 10.0}),
-    Way("60, 40, 30, prior alone", {"components": FINER, "prior_weight": 1.0}),
-    Way("60, known weight 3, prior: hierarchy 0", {**HELD.options, "components": (60,)}, levels=1),
+    *(Variant(f"{c} components in every set", {"components": c}) for c in (5, 8, 10, 15, 20, 30)),
+    Variant("20, 15, 15 components: the default"),
+    Variant("20, 15, 15, sets in reverse order", backwards=True),
+    Variant("20, 10, 5", {"components": (20, 10, 5)}),
+    Variant("20, 15: hierarchies 0 and 1", levels=2),
+    Variant("20: hierarchy 0", levels=1),
+    Variant("20, 15, 15, known weight 3", {"known_weight": 3.0}),
+    Variant("20, 15, 15, known weight 3, prior", {"known_weight": 3.0, "prior_weight": 1.0}),
+    Variant("30, 20, 15, known weight 3, prior", {**WEIGHTED.options, "components": (30, 20, 15)}),
+    Variant("40, 30, 20, known weight 3, prior", {**WEIGHTED.options, "components": (40, 30, 20)}),
+    replace(WEIGHTED, name="60, 40, 30, known weight 3, prior"),
+    Variant("60, 40, 30, known weight 1, prior", {**WEIGHTED.options, "known_weight": 1.0}),
+    Variant("60, 40, 30, known weight 10, prior", {**WEIGHTED.options, "known_weight": 10.0}),
+    Variant("60, 40, 30, prior alone", {"components": FINER, "prior_weight": 1.0}),
+    Variant(
+        "60, known weight 3, prior: hierarchy 0",
+        {**WEIGHTED.options, "components": (60,)},
+        levels=1,
+    ),
 )
 
 
 def mean_errors(
-    inference: DisplacementModel, layout: FeatureLayout, clip: HeldOut, count: int
+    model: DisplacementModel, layout: FeatureLayout, clip: HeldOut, count: int
 ) -> Float[Array, " 3"]:
     """Px over 25 expressions: at points that were not given, at those given, at all."""
     known = known_points(layout, count)
-    found = np.array([inference.infer(known, truth[known]).displacements for truth in clip.truth])
+    found = np.array([model.infer(known, truth[known]).displacements for truth in clip.truth])
     errors = np.linalg.norm(found - clip.truth, axis=-1)
     rest = np.setdiff1d(np.arange(errors.shape[1]), known)
     return np.array([errors[:, rest].mean(), errors[:, known].mean(), errors.mean()])
 
 
 def by_iteration(
-    way: Way, layout: FeatureLayout, clip: HeldOut, counts: Sequence[int]
+    variant: Variant, layout: FeatureLayout, clip: HeldOut, counts: Sequence[int]
 ) -> dict[int, Float[Array, "s 3"]]:
     """For each number of given points the errors after each of STEPS."""
-    made = [way.made(layout, clip, step) for step in STEPS]
+    made = [variant.made(layout, clip, step) for step in STEPS]
     return {
-        count: np.array([mean_errors(inference, layout, clip, count) for inference in made])
+        count: np.array([mean_errors(model, layout, clip, count) for model in made])
         for count in counts
     }
 
@@ -108,17 +112,17 @@ def by_count(layout: FeatureLayout, clips: Mapping[str, HeldOut]) -> str:
         unmoved = float(np.linalg.norm(clip.truth, axis=-1).mean())
         best = ConditionalGaussian(clip.statistics)
         same = ConditionalGaussian(clip.statistics, components=COMPONENTS[0])
-        ways = [way.made(layout, clip, STEPS[-1]) for way in (PRINTED, HELD)]
+        variants = [variant.made(layout, clip, STEPS[-1]) for variant in (PRINTED, WEIGHTED)]
         for count in KNOWN:
             errors = [
-                float(mean_errors(inference, layout, clip, count)[0])
-                for inference in (*ways, same, best)
+                float(mean_errors(model, layout, clip, count)[0])
+                for model in (*variants, same, best)
             ]
             ratios = [errors[0] / errors[2], errors[0] / errors[3], errors[1] / errors[3]]
             rows.append([f"{name}, {count} points", unmoved, *errors, *ratios])
     closed = (f"closed form, {COMPONENTS[0]} components", "closed form, 60")
     ratios_named = ("printed / 20", "printed / 60", "prior / 60")
-    header = ("", "unmoved", PRINTED.name, HELD.name, *closed, *ratios_named)
+    header = ("", "unmoved", PRINTED.name, WEIGHTED.name, *closed, *ratios_named)
     return markdown_table(header, rows)
 
 
@@ -127,35 +131,35 @@ def fig_12(
 ) -> tuple[str, dict[tuple[str, str], Float[Array, "s 3"]]]:
     """The table by iteration, and the curves in it."""
     curves = {
-        (name, way.name): by_iteration(way, layout, clip, [GIVEN])[GIVEN]
+        (name, variant.name): by_iteration(variant, layout, clip, [GIVEN])[GIVEN]
         for name, clip in clips.items()
-        for way in (PRINTED, HELD)
+        for variant in (PRINTED, WEIGHTED)
     }
     rows: list[list[object]] = []
-    for (name, way), curve in curves.items():
+    for (name, variant), curve in curves.items():
         for part, errors in zip(("not given", "given", "all"), curve.T, strict=True):
-            rows.append([f"{name}, {way}: {part}", *(float(error) for error in errors)])
+            rows.append([f"{name}, {variant}: {part}", *(float(error) for error in errors)])
     return markdown_table(("iteration", *map(str, STEPS)), rows), curves
 
 
 def what_was_tried(layout: FeatureLayout, clips: Mapping[str, HeldOut]) -> str:
-    """Components, sets, their order, statistics and how the head's motion is told."""
+    """Components, sets, their order, statistics and which points the head's motion is from."""
     rows: list[list[object]] = []
-    for way in TRIED:
-        made = [way.made(layout, clip, STEPS[-1]) for clip in clips.values()]
-        rows.append([way.name, *_both(made, layout, clips)])
+    for variant in TRIED:
+        made = [variant.made(layout, clip, STEPS[-1]) for clip in clips.values()]
+        rows.append([variant.name, *_both(made, layout, clips)])
     few = {name: clip.few(40) for name, clip in clips.items()}
     known = known_points(layout, GIVEN)
-    seen = {name: clip.seen_by(known, learned=False) for name, clip in clips.items()}
-    alike = {name: clip.seen_by(known, learned=True) for name, clip in clips.items()}
+    aligned = {name: clip.aligned_by(known, statistics=False) for name, clip in clips.items()}
+    both = {name: clip.aligned_by(known, statistics=True) for name, clip in clips.items()}
     for title, others in (
         ("statistics of the 40 most different frames", few),
-        ("head motion by the 17 points", seen),
-        ("head motion by the 17 points, in the statistics too", alike),
+        ("head motion by the 17 points", aligned),
+        ("head motion by the 17 points, in the statistics too", both),
     ):
-        for way in (PRINTED, HELD):
-            made = [way.made(layout, clip, STEPS[-1]) for clip in others.values()]
-            rows.append([f"{way.name}: {title}", *_both(made, layout, others)])
+        for variant in (PRINTED, WEIGHTED):
+            made = [variant.made(layout, clip, STEPS[-1]) for clip in others.values()]
+            rows.append([f"{variant.name}: {title}", *_both(made, layout, others)])
         closed = [ConditionalGaussian(clip.statistics, components=30) for clip in others.values()]
         rows.append([f"closed form, 30 components: {title}", *_both(closed, layout, others)])
     for count in (8, 15, 20, 30, 40, 60, 90):
@@ -167,10 +171,10 @@ def what_was_tried(layout: FeatureLayout, clips: Mapping[str, HeldOut]) -> str:
 def stop_rule(layout: FeatureLayout, clips: Mapping[str, HeldOut]) -> str:
     """Iterations and errors by threshold."""
     known, rows = known_points(layout, GIVEN), []
-    for way in (PRINTED, HELD):
+    for variant in (PRINTED, WEIGHTED):
         for threshold in (1e-1, 1e-2, 1e-3, 1e-4):
-            stopping = replace(way, options={**way.options, "threshold": threshold})
-            row: list[object] = [f"{way.name}, {threshold:g} px"]
+            stopping = replace(variant, options={**variant.options, "threshold": threshold})
+            row: list[object] = [f"{variant.name}, {threshold:g} px"]
             for clip in clips.values():
                 made = stopping.made(layout, clip, 500)
                 found = [made.infer(known, truth[known]) for truth in clip.truth]
@@ -185,8 +189,8 @@ def _both(
     made: Sequence[DisplacementModel], layout: FeatureLayout, clips: Mapping[str, HeldOut]
 ) -> list[float]:
     return [
-        float(mean_errors(inference, layout, clip, GIVEN)[0])
-        for inference, clip in zip(made, clips.values(), strict=True)
+        float(mean_errors(model, layout, clip, GIVEN)[0])
+        for model, clip in zip(made, clips.values(), strict=True)
     ]
 
 
@@ -198,9 +202,9 @@ def draw(
 
     figure, panels = plt.subplots(1, len(closed), figsize=(8, 3.4), layout="constrained")
     for panel, (name, best) in zip(panels, closed.items(), strict=True):
-        for way, colour in ((PRINTED, "#7a8ca3"), (HELD, "#c2410c")):
-            curve = curves[name, way.name]
-            panel.plot(STEPS, curve[:, 0], color=colour, label=f"{way.name}: points not given")
+        for variant, colour in ((PRINTED, "#7a8ca3"), (WEIGHTED, "#c2410c")):
+            curve = curves[name, variant.name]
+            panel.plot(STEPS, curve[:, 0], color=colour, label=f"{variant.name}: points not given")
             panel.plot(STEPS, curve[:, 1], color=colour, ls="--", label="the 17 given")
         panel.axhline(best, color="black", lw=1, label="closed form: points not given")
         panel.axhline(TARGET_PX, color="black", lw=0.8, ls=":", label="1.5 px")

@@ -1,4 +1,4 @@
-"""Expressions of filmed faces, parted into those that are learned from and those to be found."""
+"""Expressions of filmed faces, split into statistics and held-out ones."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mien.synthesis.examples.head_alignment import align_to_neutral
 __all__ = ["KNOWN", "HeldOut", "held_out", "known_points", "most_different"]
 
 BLOCK = 15
-"""Frames that stay together, so that no held-out frame has its neighbour among the learned."""
+"""Frames that are not split, so that no held-out frame has its neighbour in the statistics."""
 EXPRESSIONS = 25
 IMAGE_HEIGHT = 1000
 """Of [Zhang 2006]'s images, 750 wide: clips are cut to that shape at their full height."""
@@ -43,7 +43,7 @@ _FORTY = (
     *("upper_lip_inner", "lower_lip_inner", "nose_tip", "forehead", "chin"),
 )
 KNOWN = {len(names): names for names in (_FIVE, _SEVENTEEN, _TWENTY_SEVEN, _FORTY)}
-"""What a tracker would find: brows, lids, wings of the nose, lips, chin."""
+"""Points that trackers find: brows, lids, wings of the nose, lips, chin."""
 
 
 @dataclass(frozen=True)
@@ -64,17 +64,18 @@ class HeldOut:
         """The same, learned from the most different expressions only."""
         return replace(self, statistics=self.statistics[most_different(self.statistics, count)])
 
-    def seen_by(self, known: Int[Array, " k"], *, learned: bool) -> HeldOut:
-        """The same, the head's motion of what is to be found told by the known points alone.
+    def aligned_by(self, known: Int[Array, " k"], *, statistics: bool) -> HeldOut:
+        """The same, head motion of the truth estimated from the known points alone.
 
         Args:
-            learned: that of the statistics as well.
+            known: indices of points.
+            statistics: that of the statistics as well.
         """
-        truth = self._seen_by(known, self.truth)
-        statistics = self._seen_by(known, self.statistics) if learned else self.statistics
-        return replace(self, truth=truth, statistics=statistics)
+        truth = self._aligned(known, self.truth)
+        aligned = self._aligned(known, self.statistics) if statistics else self.statistics
+        return replace(self, truth=truth, statistics=aligned)
 
-    def _seen_by(self, known: Array, displacements: Array) -> Array:
+    def _aligned(self, known: Array, displacements: Array) -> Array:
         geometries, _ = align_to_neutral(displacements + self.neutral, self.neutral, subset=known)
         return geometries - self.neutral
 
@@ -89,7 +90,7 @@ def held_out(clip: Path, layout: FeatureLayout, detector: LandmarkDetector) -> H
             found.append((frame.index, points * (IMAGE_HEIGHT / frame.size[1])))
     points = np.array([points for _, points in found])
     odd = np.array([index for index, _ in found]) // BLOCK % 2 == 1
-    neutral = _most_usual(points[odd])
+    neutral = _nearest_to_median(points[odd])
     displacements = align_to_neutral(points, neutral)[0] - neutral
     chosen = most_different(displacements[~odd], EXPRESSIONS)
     return HeldOut(displacements[odd], displacements[~odd][chosen], neutral)
@@ -112,7 +113,7 @@ def most_different(displacements: Float[Array, "m n 2"], count: int) -> Int[Arra
     return np.array(chosen)
 
 
-def _most_usual(points: Float[Array, "m n 2"]) -> Float[Array, "n 2"]:
+def _nearest_to_median(points: Float[Array, "m n 2"]) -> Float[Array, "n 2"]:
     geometries, _ = align_to_neutral(points, points[0])
-    away = np.linalg.norm(geometries - np.median(geometries, axis=0), axis=-1).sum(axis=-1)
-    return points[away.argmin()]
+    distances = np.linalg.norm(geometries - np.median(geometries, axis=0), axis=-1).sum(axis=-1)
+    return points[distances.argmin()]

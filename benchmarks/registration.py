@@ -29,7 +29,7 @@ from benchmarks.scan import DATA, Scan, SurfaceError, load_scan
 from benchmarks.table import markdown_table, write_results
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead, load_generic_head
-from mien.capture.source import View, load_capture
+from mien.capture.source import CapturedView, load_capture
 from mien.errors import EstimationError
 from mien.reconstruction.fit import Fit, FitOptions, fit_views
 
@@ -140,13 +140,13 @@ def _same_point(
     return fitted, unfitted
 
 
-def _views(case: Case) -> tuple[View, ...]:
+def _views(case: Case) -> tuple[CapturedView, ...]:
     views = without_marks(_capture(case.photos))
     return tuple(view for view in views if case.stems is None or view.photo.stem in case.stems)
 
 
 @cache
-def _capture(photos: Path) -> tuple[View, ...]:
+def _capture(photos: Path) -> tuple[CapturedView, ...]:
     return load_capture(photos).views
 
 
@@ -231,8 +231,8 @@ INTRO = (
 SURFACE = (
     "Distances over the face, after a similarity. Same point: on scans what lies behind the same "
     "pixel of every photo, through the fitted camera and through the true one; on persons the same "
-    "vertex. Nearest point: as in docs/accuracy.md, after ICP. The generic head, not fitted, is "
-    "measured beside it in the same way."
+    "vertex. Nearest point: as in docs/notes/accuracy.md, after ICP. The generic head, not fitted, "
+    "is measured beside it in the same way."
 )
 CAMERAS = (
     "Turn: of every photo from the first, against the true one. Seconds: of the fit, without "

@@ -1,4 +1,7 @@
-"""How far a fitted head is from a scan of the same person (docs/accuracy.md tells how and why)."""
+"""How far a fitted head is from a scan of the same person.
+
+docs/notes/accuracy.md says how and why.
+"""
 
 from __future__ import annotations
 

@@ -45,13 +45,13 @@ def main() -> int:
 def beside_peers(load: str) -> list[str]:
     """mien's steps, peers' and a plain copy, all in turn, round after round."""
     examples, frames = scene(EXAMPLES, SIZE)
-    shares = [coefficients(examples, points) for points in frames]
-    moved, lookups = moved_bytes(examples, shares)
-    tasks = mien_tasks(examples, frames, shares) | {
+    mixtures = [coefficients(examples, points) for points in frames]
+    moved, lookups = moved_bytes(examples, mixtures)
+    tasks = mien_tasks(examples, frames, mixtures) | {
         "one photo warped by OpenCV, triangle by triangle": lambda k: opencv_warp(
             examples, frames[k % len(frames)]
         ),
-        "ten aligned photos mixed by numpy": mixed_by_numpy(examples, shares[0]),
+        "ten aligned photos mixed by numpy": mixed_by_numpy(examples, mixtures[0]),
         "the bytes that must move, copied by one core": copy_of(moved, 1),
         f"the same, copied by {CORES} cores": copy_of(moved, CORES),
     }
@@ -88,9 +88,9 @@ def growth() -> list[str]:
     rows = []
     for count, size in [*((count, SIZE) for count in MANY), (EXAMPLES, LARGE)]:
         examples, frames = scene(count, size)
-        shares = [coefficients(examples, points) for points in frames]
-        _, lookups = moved_bytes(examples, shares)
-        times = in_rounds(mien_tasks(examples, frames, shares), 7)
+        mixtures = [coefficients(examples, points) for points in frames]
+        _, lookups = moved_bytes(examples, mixtures)
+        times = in_rounds(mien_tasks(examples, frames, mixtures), 7)
         whole, shared, drawn = times.values()
         pixels = f"{size[0]}x{size[1]}"
         work = [t.work for t in (whole, shared, drawn)]
@@ -115,7 +115,7 @@ def memory() -> str:
     )
 
 
-def mien_tasks(examples: ExampleSet, frames: list[Array], shares: list[Array]) -> dict[str, Task]:
+def mien_tasks(examples: ExampleSet, frames: list[Array], mixtures: list[Array]) -> dict[str, Task]:
     """From points to image, and its two steps."""
     composer, count = Composer(examples, skip=SKIP), len(frames)
     out = np.empty_like(examples.neutral.photo)
@@ -127,7 +127,9 @@ def mien_tasks(examples: ExampleSet, frames: list[Array], shares: list[Array]) -
     return {
         "mien, points to image": whole,
         "of this, shares": lambda k: coefficients(examples, frames[k % count]),
-        "of this, image": lambda k: composer.render(frames[k % count], shares[k % count], out=out),
+        "of this, image": lambda k: composer.render(
+            frames[k % count], mixtures[k % count], out=out
+        ),
     }
 
 
@@ -171,13 +173,13 @@ def in_rounds(tasks: Mapping[str, Task], rounds: int) -> dict[str, Times]:
     for round_ in range(rounds):
         for name, task in tasks.items():
             once = timed(task, round_, 1)[0]
-            # What is short is repeated, to be told from the clock's own time.
+            # Short tasks are repeated, for the resolution of the clock.
             times[name].append(timed(task, round_, min(max(int(30 / once), 1), 20)))
-    found = {}
+    result = {}
     for name, pairs in times.items():
         wall, work = zip(*pairs, strict=True)
-        found[name] = Times(statistics.median(wall), min(wall), min(work))
-    return found
+        result[name] = Times(statistics.median(wall), min(wall), min(work))
+    return result
 
 
 def timed(task: Task, start: int, repeats: int) -> tuple[float, float]:
@@ -189,21 +191,21 @@ def timed(task: Task, start: int, repeats: int) -> tuple[float, float]:
     return 1e3 * clock / repeats, 1e3 * work / repeats
 
 
-def moved_bytes(examples: ExampleSet, shares: list[Array]) -> tuple[float, float]:
+def moved_bytes(examples: ExampleSet, mixtures: list[Array]) -> tuple[float, float]:
     """Bytes that a mean frame reads and writes at least; texels among them.
 
-    Told on the standard image, which here has the neutral face's points.
+    Computed in the standard image, which here has the neutral face's points.
     """
     fades = examples.subregions.fades
     whole, around = fades.sum(2), np.zeros(fades.shape[:2], np.uint8)
     frame = examples.layout.frame(examples.neutral.points)
     cv2.fillPoly(around, [np.asarray(np.round(frame), np.int32)], 1)
-    counted = np.mean([((fades @ (np.abs(row) > SKIP)) > 0).sum() for row in shares])
+    counted = np.mean([((fades @ (np.abs(row) > SKIP)) > 0).sum() for row in mixtures])
     # Around the subregions, and where they fade out, one more: neutral.
     lookups = float(counted + ((around > 0) & (whole < 1 - 1e-6)).sum())
     blends = (fades > 0).sum(2)
-    said = 4 * (around > 0).sum() + blends[blends > 1].sum()
-    return 4 * lookups + float(said) + 2 * examples.neutral.photo.nbytes, lookups
+    looked_up = 4 * (around > 0).sum() + blends[blends > 1].sum()
+    return 4 * lookups + float(looked_up) + 2 * examples.neutral.photo.nbytes, lookups
 
 
 def copy_of(moved: float, threads: int) -> Task:
@@ -214,9 +216,9 @@ def copy_of(moved: float, threads: int) -> Task:
     pool = ThreadPoolExecutor(threads)
 
     def copy(k: int) -> object:
-        here, there = target[k % 16], source[k % 16]
-        others = [pool.submit(np.copyto, here[n], there[n]) for n in range(1, threads)]
-        np.copyto(here[0], there[0])
+        to, of = target[k % 16], source[k % 16]
+        others = [pool.submit(np.copyto, to[n], of[n]) for n in range(1, threads)]
+        np.copyto(to[0], of[0])
         return [other.result() for other in others]
 
     return copy

@@ -1,4 +1,4 @@
-"""What others would do in place of synthesis, as far as they do it: to be timed beside mien."""
+"""The nearest that other libraries offer to synthesis, to be timed beside mien."""
 
 from __future__ import annotations
 
@@ -23,30 +23,34 @@ def opencv_warp(examples: ExampleSet, points: Array) -> Array:
     target = np.concatenate([points, frame])
     out: Array = photo.copy()
     for triangle in layout.triangles:
-        there, here = np.float32(source[triangle]), np.float32(target[triangle])
-        low = np.maximum(np.floor(here.min(0)).astype(int), 0)
-        high = np.minimum(np.ceil(here.max(0)).astype(int), [width, height])
+        source_corners, target_corners = np.float32(source[triangle]), np.float32(target[triangle])
+        low = np.maximum(np.floor(target_corners.min(0)).astype(int), 0)
+        high = np.minimum(np.ceil(target_corners.max(0)).astype(int), [width, height])
         if (high <= low).any():
             continue
         size = (int(high[0] - low[0]), int(high[1] - low[1]))
-        affine = cv2.getAffineTransform(there, np.float32(here - low))
+        affine = cv2.getAffineTransform(source_corners, np.float32(target_corners - low))
         warped = cv2.warpAffine(photo, affine, size, borderMode=cv2.BORDER_REPLICATE)
         mask = np.zeros(size[::-1], np.uint8)
-        cv2.fillConvexPoly(mask, np.int32(np.round(here - low)), 1)
+        cv2.fillConvexPoly(mask, np.int32(np.round(target_corners - low)), 1)
         box = out[low[1] : high[1], low[0] : high[0]]
         box[mask > 0] = warped[mask > 0]
     return out
 
 
-def mixed_by_numpy(examples: ExampleSet, shares: Array) -> Callable[[int], object]:
+def mixed_by_numpy(examples: ExampleSet, coefficients: Array) -> Callable[[int], object]:
     """Eq. (6) and (7) over aligned images, without any warp."""
     images = np.stack([example.photo for example in examples.examples]).astype(np.float32)
-    fades, weights = examples.subregions.fades, shares.astype(np.float32)
+    fades, weights = examples.subregions.fades, coefficients.astype(np.float32)
     return lambda _: np.einsum("hwm,mhwc->hwc", fades @ weights, images).astype(np.uint8)
 
 
 def skimage_warp(examples: ExampleSet, points: Array) -> Callable[[int], object]:
-    """PiecewiseAffineTransform, estimated and applied. Raises: ImportError: it is not installed."""
+    """PiecewiseAffineTransform, estimated and applied.
+
+    Raises:
+        ImportError: it is not installed.
+    """
     transform = importlib.import_module("skimage.transform")
     source, photo = examples.neutral.points, examples.neutral.photo
 

@@ -1,4 +1,4 @@
-"""Pictures for docs/tracking.md. Run: python -m benchmarks.track_plots HEAD_OF_CAP12"""
+"""Pictures for docs/notes/tracking.md. Run: python -m benchmarks.track_plots HEAD_OF_CAP12"""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from benchmarks.table import markdown_table, write_results
 from benchmarks.track_scenes import with_expressions
 from mien.arrays import Array, UInt8
 from mien.capture.video.video import Video
-from mien.io.files.video import write_video
+from mien.io.files.video import save_video
 from mien.io.head.head_folder import load_head, save_head
 
 CORES, RUNS, LONG = 2, 3, 10_000
@@ -151,8 +151,8 @@ def compare(work: Path, clip: Path, head: Path, *, runs: int) -> str:
     for name, size in SIZES.items():
         count, fps = FRAMES[name], Video(clip).facts().fps
         whole, one = work / f"{name}.mp4", work / f"{name}-one.mp4"
-        write_video(whole, ping_pong(clip, size, count), fps)
-        write_video(one, ping_pong(clip, size, 1), fps)
+        save_video(whole, ping_pong(clip, size, count), fps)
+        save_video(one, ping_pong(clip, size, 1), fps)
         found: dict[str, list[Ran]] = {}
         for _ in range(runs + 1):  # The first one compiles and fills the caches.
             for key, video in (("whole", whole), ("one", one)):
@@ -192,7 +192,7 @@ def _each(seconds: dict[str, float], count: int) -> list[float]:
 def memory_over(work: Path, clip: Path, head: Path, count: int) -> str:
     """What a long video takes."""
     video = work / "long.mp4"
-    write_video(video, ping_pong(clip, SIZES["300x300"], count), Video(clip).facts().fps)
+    save_video(video, ping_pong(clip, SIZES["300x300"], count), Video(clip).facts().fps)
     ran = run(track_command(video, head, work / "track.csv"))
     row = [f"300x300, {count} frames", ran.seconds, count / ran.seconds, ran.peak_mb, ran.growth_mb]
     header = ("mien", "s", "frames/s", "peak MiB", "MiB from the second tenth to the last")

@@ -6,8 +6,8 @@ Usage: python examples/01_build.py [PHOTOS] [HEAD]
 import sys
 from pathlib import Path
 
-from mien.pipelines.build import build_head_folder
-from mien.pipelines.demo import demo_photos
+from mien.capture import demo_photos
+from mien.reconstruction import build_head_folder
 
 photos = Path(sys.argv[1]) if len(sys.argv) > 1 else demo_photos()
 folder = Path(sys.argv[2]) if len(sys.argv) > 2 else Path("example-head")

@@ -8,7 +8,7 @@ from math import radians
 from pathlib import Path
 
 from mien import FaceState, export_head, load_head, render_head
-from mien.io.files.image import save_image
+from mien.io import save_image
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("example-head")
 head = load_head(folder)

@@ -9,7 +9,8 @@ from math import radians
 from pathlib import Path
 from typing import Any
 
-from mien import animate_head, load_head, load_performance
+from mien import animate_head, load_head
+from mien.animate import load_timeline
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("example-head")
 head = load_head(folder)
@@ -35,7 +36,7 @@ document = {
 
 path = folder.with_name(f"{folder.name}-hello.json")
 path.write_text(json.dumps(document, indent=2), encoding="utf-8")
-timeline = load_performance(path)
+timeline = load_timeline(path)
 for suffix in (".mp4", ".glb", ".csv"):
     take = animate_head(head, timeline, path.with_suffix(suffix), yaw=radians(-10))
     print(f"{path.with_suffix(suffix)}: {take.frames} frames")

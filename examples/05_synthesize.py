@@ -10,15 +10,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from mien import (
-    FaceState,
-    HeadRenderer,
-    Synthesizer,
-    gather_examples,
-    load_examples,
-    load_head,
-    write_examples,
-)
+from mien import FaceState, gather_examples, load_examples, load_head
+from mien.io import save_examples
+from mien.render import HeadRenderer
+from mien.synthesis import Synthesizer
 
 source = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("example-photos")
 folder = source.with_name(f"{source.stem}-examples")
@@ -41,9 +36,9 @@ if len(sys.argv) < 2:
         picture = renderer.draw(FaceState(units=units), camera, background=(96, 96, 104))
         Image.fromarray(picture[..., :3]).save(source / f"take_{number:02}.png")
 
-# The pictures that differ most become examples; all tell how the points move together.
+# The pictures that differ most become examples; all give the statistics of the points.
 gathered = gather_examples(source)
-write_examples(folder, gathered.examples, why=gathered.why)
+save_examples(folder, gathered.examples, why=gathered.why)
 for note in gathered.notes:
     print("note:", note)
 
@@ -54,9 +49,9 @@ synthesizer = Synthesizer(examples)
 # Corners of the mouth go up and out by a fortieth of the face; all other points follow, and then
 # the picture, every subregion from the examples that come nearest to it.
 step = np.ptp(neutral[:, 0]) / 40
-corners = {"right_mouth_corner": [-step, -step], "left_mouth_corner": [step, -step]}
-known = np.array([layout.index(name) for name in corners])
-points = synthesizer.complete(known, neutral[known] + list(corners.values()), head="still")
+shifts = {"right_mouth_corner": [-step, -step], "left_mouth_corner": [step, -step]}
+corners = {name: neutral[layout.index(name)] + shift for name, shift in shifts.items()}
+points = synthesizer.complete(corners, head="still")
 made = synthesizer.synthesize(points)
 
 path = folder.with_suffix(".png")

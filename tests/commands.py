@@ -23,7 +23,7 @@ from mien.capture.images.photos import Photo
 from mien.cli.main import main
 from mien.head import ATLAS, Expression
 from mien.io.head.head_folder import save_head
-from mien.io.landmarks.points_json import write_points_json
+from mien.io.landmarks.points_json import save_points_json
 from mien.pipelines.build import Build, build_head
 from mien.pipelines.demo import demo_photos
 from mien.synthesis.examples.example_set import Example, ExampleSet
@@ -171,7 +171,7 @@ def asked(tmp_path: Path) -> Callable[..., Path]:
     def write(points: Array, *names: str) -> Path:
         layout = load_feature_layout()
         given = {name: points[layout.index(name)] for name in names or layout.names}
-        write_points_json(tmp_path / "P.json", layout, given)
+        save_points_json(tmp_path / "P.json", layout, given)
         return tmp_path / "P.json"
 
     return write

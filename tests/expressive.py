@@ -12,11 +12,11 @@ from marbled import GENERIC, Person, at
 from mien.arrays import Array
 from mien.camera import Camera
 from mien.capture.faces.landmarks import Landmarks
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.numeric.rotation import rotation_from_vector
 from mien.reconstruction.expression.known_head import KnownHead
 from mien.reconstruction.features import Features, gather_features
-from mien.reconstruction.observations import Sightings
+from mien.reconstruction.observations import SurfaceObservations
 from people import person
 
 NEUTRAL = person(3)
@@ -57,8 +57,8 @@ def bump(middle: Array, *, width_mm: float, along: Sequence[float]) -> Array:
 
 
 def exactly_detected(
-    view: View, seen_from: Camera, vertices: Array, *, scores: Array | None = None
-) -> View:
+    view: CapturedView, seen_from: Camera, vertices: Array, *, scores: Array | None = None
+) -> CapturedView:
     """The photo with the landmarks of a perfect detector."""
     points = seen_from.project(GENERIC.landmark_positions(vertices))
     marks = Landmarks(
@@ -68,7 +68,7 @@ def exactly_detected(
 
 
 @cache
-def neutral_photo(yaw: float = 0.0) -> View:
+def neutral_photo(yaw: float = 0.0) -> CapturedView:
     """The person's photo from there, with exact landmarks."""
     view = Person(NEUTRAL, 1).seen_by(at(yaw), name=f"neutral {yaw:.0f}.png")
     return exactly_detected(view, at(yaw), NEUTRAL)
@@ -95,7 +95,7 @@ def features_of(vertices: Array, cameras: Sequence[Camera]) -> Features:
 
 def skin_seen(
     vertices: Array, cameras: Sequence[Camera], *, count: int, sigma_mm: float = 0.4
-) -> Sightings:
+) -> SurfaceObservations:
     """Places of the face's skin, exactly where these cameras see them on this head."""
     rng = np.random.default_rng(7)
     mesh = GENERIC.mesh
@@ -111,7 +111,7 @@ def skin_seen(
         barycentrics = rng.dirichlet(np.ones(3), size=count)
         places = np.einsum("mc,mcd->md", barycentrics, vertices[corners])
         parts.append(
-            Sightings(
+            SurfaceObservations(
                 corners,
                 barycentrics,
                 np.zeros((count, 3)),
@@ -128,13 +128,13 @@ def skin_seen(
 
 def vertices_seen(
     vertices: Array, cameras: Sequence[Camera], seen: Array, *, sigma_mm: float = 0.4
-) -> Sightings:
+) -> SurfaceObservations:
     """These vertices, exactly where every one of the cameras sees them."""
     which = np.tile(seen, len(cameras))
-    return Sightings(
+    return SurfaceObservations(
         corners=np.repeat(which[:, None], 3, axis=1),
         barycentrics=np.tile([1.0, 0.0, 0.0], (len(which), 1)),
-        beside=np.zeros((len(which), 3)),
+        offset=np.zeros((len(which), 3)),
         photo=np.repeat(np.arange(len(cameras)), len(seen)),
         image_points=np.concatenate([item.project(vertices[seen]) for item in cameras]),
         sigma_mm=np.full(len(which), sigma_mm),

@@ -14,7 +14,7 @@ from mien.assets.generic import load_generic_head
 from mien.camera import Camera
 from mien.capture.faces.landmarks import Landmarks
 from mien.capture.images.photos import Photo
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.numeric.raster.rasterizer import interpolate, rasterize
 from people import camera
 
@@ -38,7 +38,7 @@ class Person:
     vertices: Array
     skin: int
 
-    def seen_by(self, seen_from: Camera, *, name: str = "photo.png") -> View:
+    def seen_by(self, seen_from: Camera, *, name: str = "photo.png") -> CapturedView:
         """A photo of this person: neither marks nor landmarks."""
         depth = seen_from.to_camera(self.vertices)[:, 2]
         pixels = seen_from.project(self.vertices)
@@ -50,7 +50,7 @@ class Person:
         greys[raster.mask] = map_coordinates(marble(self.skin), lattice, order=1, mode="wrap")
         image = np.clip(np.rint(greys), 0, 255).astype(np.uint8)
         photo = Photo(name, Path(name), np.repeat(image[..., None], 3, axis=2))
-        return View(photo, None, None)
+        return CapturedView(photo, None, None)
 
 
 def clutter(height: int, width: int, seed: int) -> Array:
@@ -67,13 +67,15 @@ def at(yaw: float, pitch: float = 0.0, roll: float = 0.0, *, distance: float = 9
     return Camera(*SIZE, PX_PER_MM * distance, seen_from.R_cam_head, shift)
 
 
-def photographed(who: Person, yaws: tuple[float, ...]) -> list[tuple[View, Camera]]:
+def photographed(who: Person, yaws: tuple[float, ...]) -> list[tuple[CapturedView, Camera]]:
     """Photos from these sides with their cameras."""
     cameras = [at(yaw, 4 * (-1) ** k) for k, yaw in enumerate(yaws)]
     return [(who.seen_by(item, name=f"{k}.png"), item) for k, item in enumerate(cameras)]
 
 
-def detected(view: View, seen_from: Camera, vertices: Array, *, off_mm: float = 2.0) -> View:
+def detected(
+    view: CapturedView, seen_from: Camera, vertices: Array, *, off_mm: float = 2.0
+) -> CapturedView:
     """The photo with landmarks that lie off by so much."""
     rng = np.random.default_rng(abs(int(seen_from.center[0])))
     points = seen_from.project(GENERIC.landmark_positions(vertices))

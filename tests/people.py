@@ -13,7 +13,7 @@ from mien.camera import Camera
 from mien.capture.annotations import Annotations
 from mien.capture.faces.landmarks import Landmarks
 from mien.capture.images.photos import Photo
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.numeric.rotation import angle_between, rotation_from_vector
 
 SIZE = (1000, 1300)
@@ -64,7 +64,7 @@ def photographed(
     points: Sequence[str] | None = None,
     curves: Sequence[str] = (),
     landmarks: bool = False,
-) -> View:
+) -> CapturedView:
     """A black photo of this person with exact marks.
 
     Args:
@@ -80,7 +80,7 @@ def photographed(
     seen = seen_from.project(generic.landmark_positions(vertices))
     detected = Landmarks(seen, np.ones(478), np.zeros(52), seen_from.R_cam_head)
     photo = Photo(name, Path(name), np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
-    return View(photo, detected if landmarks else None, marks or None)
+    return CapturedView(photo, detected if landmarks else None, marks or None)
 
 
 def turns_between(views: Sequence[Camera]) -> Array:

@@ -10,7 +10,7 @@ EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("[0-9]*.py"))
 
 
 def test_examples_run_in_order(tmp_path: Path) -> None:
-    assert len(EXAMPLES) >= 5
+    assert len(EXAMPLES) >= 6
     for script in EXAMPLES:
         done = subprocess.run(
             [sys.executable, "-W", "error", script], cwd=tmp_path, capture_output=True, text=True
@@ -25,3 +25,4 @@ def test_examples_run_in_order(tmp_path: Path) -> None:
         assert (tmp_path / f"example-head-track{suffix}").stat().st_size > 300
     assert (tmp_path / "example-photos-examples" / "examples.json").is_file()
     assert (tmp_path / "example-photos-examples.png").stat().st_size > 10_000
+    assert (tmp_path / "example-notebook.png").stat().st_size > 10_000

@@ -11,7 +11,7 @@ SOURCE = Path(__file__).parents[1] / "src" / "mien"
 
 # From the first stage to the last. Modules that share an entry may use each other.
 ORDER = (
-    ("errors", "limits"),
+    ("errors", "lazy", "limits", "progress"),
     ("arrays", "reading"),
     ("expression_names",),
     ("mesh", "camera"),
@@ -92,3 +92,119 @@ def test_no_relative_imports() -> None:
         tree = ast.parse(path.read_text(encoding="utf-8"))
         relative = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.level]
         assert not relative, f"{path}: line {relative[0].lineno}"
+
+
+def module_imports(source: str) -> set[str]:
+    """Modules whose code an import runs, and names that may be such; not what only types need.
+
+    Imports inside functions count: they are how a cycle is hidden.
+    """
+    found = set()
+    waiting: list[ast.AST] = [ast.parse(source)]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+            waiting.extend(node.orelse)
+            continue
+        waiting.extend(ast.iter_child_nodes(node))
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found.update(f"{node.module}.{alias.name}" for alias in node.names)
+    return found
+
+
+def import_graph(sources: dict[str, str]) -> dict[str, set[str]]:
+    """Of each module, those others that it imports; a package's own name is its `__init__`.
+
+    A name that is taken from a module counts as that module; `mien` itself, whose names are loaded
+    when they are asked for, is left out.
+    """
+    graph: dict[str, set[str]] = {}
+    for module, source in sources.items():
+        graph[module] = set()
+        for name in module_imports(source):
+            target = name if name in sources else name.rpartition(".")[0]
+            if target in sources and target not in ("mien", module):
+                graph[module].add(target)
+    return graph
+
+
+def import_cycle(graph: dict[str, set[str]]) -> list[str]:
+    """Modules that import each other in a circle, the first one again at the end; [] for none."""
+    done: set[str] = set()
+
+    def visit(module: str, path: list[str]) -> list[str]:
+        if module in path:
+            return [*path[path.index(module) :], module]
+        if module not in done:
+            for imported in sorted(graph[module]):
+                if cycle := visit(imported, [*path, module]):
+                    return cycle
+            done.add(module)
+        return []
+
+    for module in sorted(graph):
+        if cycle := visit(module, []):
+            return cycle
+    return []
+
+
+def all_sources() -> dict[str, str]:
+    """The text of every module of mien, by its dotted name."""
+    sources = {}
+    for path in SOURCE.rglob("*.py"):
+        parts = ("mien", *path.relative_to(SOURCE).with_suffix("").parts)
+        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        sources[name] = path.read_text(encoding="utf-8")
+    return sources
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    assert import_cycle(import_graph(all_sources())) == []
+
+
+def test_a_circle_through_an_import_inside_a_function_is_found() -> None:
+    sources = {
+        "mien.a": "from mien.b import thing",
+        "mien.b": "import mien.c",
+        "mien.c": "def f():\n    from mien import a",
+        "mien.d": "from mien.a import other",
+    }
+    assert import_cycle(import_graph(sources)) == ["mien.a", "mien.b", "mien.c", "mien.a"]
+
+
+def test_an_import_for_types_alone_makes_no_circle() -> None:
+    sources = {
+        "mien.a": "from mien.b import thing",
+        "mien.b": "if TYPE_CHECKING:\n    from mien.a import Other",
+    }
+    assert import_cycle(import_graph(sources)) == []
+
+
+MAX_MODULES = 15
+CROWDED = frozenset({"reconstruction/dense"})
+"""Folders with more modules, until they are divided."""
+
+
+def test_no_folder_shows_more_modules_than_a_reader_takes_in() -> None:
+    for folder in [SOURCE, *(path for path in SOURCE.rglob("*") if path.is_dir())]:
+        modules = [path.stem for path in folder.glob("*.py") if path.stem != "__init__"]
+        name = folder.relative_to(SOURCE).as_posix()
+        assert len(modules) <= MAX_MODULES or name in CROWDED, f"{name}: {len(modules)} modules"
+
+
+SHARED_CLASS_NAMES = frozenset(
+    {"FitOptions", "Guess", "Look", "Pictures", "Sight", "Sightings", "View"}
+)
+"""Names of more than one public class, until they are renamed."""
+
+
+def test_no_two_public_classes_share_a_name() -> None:
+    modules: dict[str, list[str]] = {}
+    for module, source in all_sources().items():
+        for node in ast.parse(source).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                modules.setdefault(node.name, []).append(module)
+    shared = {name: found for name, found in modules.items() if len(found) > 1}
+    assert shared.keys() <= SHARED_CLASS_NAMES, shared

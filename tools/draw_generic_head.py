@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/generic-head.md: python -m tools.draw_generic_head."""
+"""Draws the pictures of docs/reference/generic-head.md: python -m tools.draw_generic_head."""
 
 from __future__ import annotations
 

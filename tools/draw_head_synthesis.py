@@ -1,4 +1,4 @@
-"""Draws the picture of docs/synthesis-heads.md: python -m tools.draw_head_synthesis HEAD.
+"""Draws the picture of docs/method/head-synthesis.md: python -m tools.draw_head_synthesis HEAD.
 
 HEAD is a head folder with the expressions of `cap13_edit2.mp4`, made by `mien build`.
 """
@@ -61,7 +61,7 @@ class Pictures:
         return _labelled(drawn[..., :3], text)
 
     def from_points(self, points: Float[Array, "n 3"]) -> list[Array]:
-        """What the points make of it, from three sides."""
+        """The expression of the points, from three sides."""
         face, tiles = self.synthesizer.synthesize(points).face, []
         for yaw in _YAWS:
             drawn = self._renderer.draw_posed(face, self._camera(yaw), background=_BACKGROUND)

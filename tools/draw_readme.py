@@ -15,7 +15,7 @@ from mien.animate.perform import moved_camera
 from mien.animate.sample import SAMPLE_TIMELINE
 from mien.arrays import Array
 from mien.io.files.image import save_image
-from mien.io.timeline.timeline_json import load_timeline
+from mien.io.timeline.timeline_json import load_timeline_json
 from mien.pipelines.build import build_head
 from mien.pipelines.demo import UNITS, demo_photos
 from mien.render.picture import HeadRenderer, render_head
@@ -48,7 +48,7 @@ def _look(head: HeadRenderer, *, yaw: float, state: FaceState | None = None) -> 
 
 def _performing(head: HeadRenderer) -> list[Array]:
     """Frames of the sample timeline, without the empty sides."""
-    timeline = load_timeline(SAMPLE_TIMELINE)
+    timeline = load_timeline_json(SAMPLE_TIMELINE)
     camera, pictures = head.camera(size=_SIZE), []
     for time in _SECONDS:
         moment = timeline.at(time)

@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/texture.md: python -m tools.draw_texture."""
+"""Draws the pictures of docs/method/texture.md: python -m tools.draw_texture."""
 
 from __future__ import annotations
 

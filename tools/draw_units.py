@@ -1,4 +1,4 @@
-"""Draws the picture of docs/face-units.md: python -m tools.draw_units HEAD.
+"""Draws the picture of docs/method/face-units.md: python -m tools.draw_units HEAD.
 
 HEAD is a head folder, made by `mien build`. Every unit is shown at weight 1: the face from the
 front, and where it moves from nearby and from the side.

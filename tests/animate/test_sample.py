@@ -9,13 +9,13 @@ from mien.animate.perform import frames_of
 from mien.animate.sample import SAMPLE_TIMELINE
 from mien.animate.timeline import Timeline
 from mien.assets.generic import load_generic_head
-from mien.io.timeline.timeline_check import check_timeline
-from mien.io.timeline.timeline_json import load_timeline
+from mien.io.timeline.timeline_file import check_timeline
+from mien.io.timeline.timeline_json import load_timeline_json
 
 
 @pytest.fixture(scope="module")
 def sample() -> Timeline:
-    return load_timeline(SAMPLE_TIMELINE)
+    return load_timeline_json(SAMPLE_TIMELINE)
 
 
 def test_it_lasts_ten_seconds_and_uses_everything(sample: Timeline) -> None:

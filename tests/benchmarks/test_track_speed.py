@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from benchmarks.track_speed import Ran, ping_pong, run
 
-from mien.io.files.video import write_video
+from mien.io.files.video import save_video
 
 
 def test_a_clip_goes_forward_and_backward(tmp_path: Path) -> None:
     greys = (40, 90, 140, 190)
-    write_video(tmp_path / "clip.mp4", (np.full((64, 64, 3), grey, np.uint8) for grey in greys), 25)
+    save_video(tmp_path / "clip.mp4", (np.full((64, 64, 3), grey, np.uint8) for grey in greys), 25)
     shown = [frame.mean() for frame in ping_pong(tmp_path / "clip.mp4", (32, 32), 9)]
     np.testing.assert_allclose(shown, [40, 90, 140, 190, 140, 90, 40, 90, 140], atol=3)
 
@@ -21,7 +21,7 @@ def test_a_clip_goes_forward_and_backward(tmp_path: Path) -> None:
 def test_wide_pictures_hold_the_clip_in_the_middle(tmp_path: Path) -> None:
     picture = np.zeros((64, 64, 3), np.uint8)
     picture[:, 28:36] = 255
-    write_video(tmp_path / "clip.mp4", [picture], 25)
+    save_video(tmp_path / "clip.mp4", [picture], 25)
     (wide,) = ping_pong(tmp_path / "clip.mp4", (160, 90), 1)
     assert wide.shape == (90, 160, 3)
     assert wide[:, 76:84].mean() > 230

@@ -15,8 +15,8 @@ from mien.capture.folder import ignored_files, photo_files
 from mien.capture.output_folders import made_by_mien
 from mien.capture.source_kind import kind_of_source
 from mien.errors import FileFormatError, InputError
-from mien.io.examples.example_folder import FORMAT as EXAMPLES
-from mien.io.head.head_json import FORMAT as HEAD
+from mien.io.examples.example_folder import EXAMPLES_FORMAT
+from mien.io.head.head_json import HEAD_FORMAT
 
 CLIPS = {
     "mp4": "libx264",
@@ -137,7 +137,10 @@ def test_nothing_given_is_not_the_current_folder(
 
 @pytest.mark.parametrize(
     ("index", "format", "kind"),
-    [("head.json", HEAD, "a head folder"), ("examples.json", EXAMPLES, "an example folder")],
+    [
+        ("head.json", HEAD_FORMAT.name, "a head folder"),
+        ("examples.json", EXAMPLES_FORMAT.name, "an example folder"),
+    ],
 )
 def test_what_mien_made_is_no_source(tmp_path: Path, index: str, format: str, kind: str) -> None:
     made = tmp_path / "made"

@@ -198,7 +198,7 @@ def stop_at(monkeypatch: pytest.MonkeyPatch, place: str, error: BaseException) -
     monkeypatch.setattr(place, stop)
 
 
-@pytest.mark.parametrize("step", ["build_head", "write_head", "write_video", "render_report"])
+@pytest.mark.parametrize("step", ["build_head", "write_head", "save_video", "render_report"])
 def test_a_build_that_fails_leaves_the_old_head(
     step: str,
     built: Built,
@@ -216,7 +216,7 @@ def test_a_build_that_fails_leaves_the_old_head(
     assert contents(head.parent) == before
 
 
-@pytest.mark.parametrize("step", ["build_head", "write_head", "write_video", "render_report"])
+@pytest.mark.parametrize("step", ["build_head", "write_head", "save_video", "render_report"])
 def test_a_build_that_is_killed_leaves_the_old_head(
     step: str,
     built: Built,

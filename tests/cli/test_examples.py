@@ -17,7 +17,7 @@ from PIL import Image
 from filmed import grey, written
 from mien.arrays import Array
 from mien.cli.examples import examples
-from mien.io.examples.example_folder import load_examples, read_reasons
+from mien.io.examples.example_folder import load_examples, load_reasons
 from mien.io.head.head_folder import load_head
 from mien.pipelines.examples import ExampleRequest, gather_examples
 from mien.render.picture import HeadRenderer
@@ -87,7 +87,7 @@ def test_a_video(mien: Mien, clip: Path, tmp_path: Path) -> None:
     assert len(choice) == 7
     assert choice["frame_000006.png"] == "no face found"
     assert choice[f"{standard.name}.png"] == "standard, its mouth is most open"
-    assert read_reasons(out)[standard.name] == choice[f"{standard.name}.png"]
+    assert load_reasons(out)[standard.name] == choice[f"{standard.name}.png"]
     with Image.open(out / "examples.jpg") as sheet:
         assert sheet.width > sheet.height
 
@@ -115,7 +115,7 @@ def test_fewer_and_smaller(mien: Mien, clip: Path, tmp_path: Path) -> None:
     assert load_examples(tmp_path / "set").neutral.photo.shape == (144, 120, 3)
 
 
-def test_marks_win(photos: Path) -> None:
+def test_annotated_points_replace_detected_ones(photos: Path) -> None:
     (photos / "annotations").mkdir()
     marks = {"layout": "zhang134", "points": {"nose_tip": [100.0, 150.0]}}
     (photos / "annotations" / "photo_0.json").write_text(json.dumps(marks))
@@ -136,7 +136,7 @@ def test_one_photo_is_enough(mien: Mien, photos: Path, tmp_path: Path) -> None:
     assert len(load_examples(tmp_path / "set").examples) == 1
 
 
-def test_exposure_is_evened_out_unless_not_wanted(photos: Path, tmp_path: Path) -> None:
+def test_exposure_is_equalized_unless_switched_off(photos: Path, tmp_path: Path) -> None:
     with Image.open(photos / "photo_4.png") as image:
         darker = (np.asarray(image) * 0.8).astype(np.uint8)
     Image.fromarray(darker).save(photos / "photo_4.png")
@@ -172,7 +172,7 @@ def test_an_older_folder_is_replaced(mien: Mien, clip: Path, photos: Path, tmp_p
         (("--count", "0"), "Invalid value for '--count'"),
     ],
 )
-def test_wishes_that_cannot_be_met(
+def test_requests_that_cannot_be_met(
     mien: Mien, clip: Path, tmp_path: Path, options: Sequence[str], message: str
 ) -> None:
     ran = mien("examples", clip, "-o", tmp_path / "set", "--json", *options)
@@ -203,7 +203,7 @@ def test_sources_and_places_that_cannot_be_used(
     assert not (tmp_path / "set").exists()
 
 
-def test_the_command_and_the_library_ask_for_the_same() -> None:
+def test_the_command_and_the_library_have_the_same_defaults() -> None:
     """Options that are not given are those of a request."""
     usual = {name: option.default for name, option in signature(examples).parameters.items()}
     request = asdict(ExampleRequest())

@@ -13,7 +13,7 @@ from PIL import Image
 from mien.arrays import Array
 from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.images.photos import Photo
-from mien.pipelines.examples import write_example_folder
+from mien.pipelines.examples import save_example_folder
 from terminal import Built, Mien
 
 EVERY = ("build", "examples", "synthesize", "synthesize, head")
@@ -46,7 +46,7 @@ def cut(man: Array) -> Array:
 def example_folder(man: Array, tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("faces")
     save(place / "photos" / "man.png", man)
-    write_example_folder(place / "photos", place / "examples")
+    save_example_folder(place / "photos", place / "examples")
     return place / "examples"
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from mien.io.examples.example_folder import write_examples
+from mien.io.examples.example_folder import save_examples
 from mien.pipelines.demo import demo_photos
 from mien.synthesis.examples.example_set import ExampleSet
 from terminal import FAST, Mien
@@ -120,7 +120,7 @@ def test_synthesize_refuses_an_example_and_marks(
     james_set: ExampleSet, mien: Mien, tmp_path: Path
 ) -> None:
     folder = tmp_path / "ex"
-    write_examples(folder, james_set)
+    save_examples(folder, james_set)
     photo = Path(shutil.copy(demo_photos() / "photo_left.png", tmp_path / "p.png"))
     marks = tmp_path / "p.tem"
     marks.write_text("mine")
@@ -141,7 +141,7 @@ def test_synthesize_refuses_an_example_and_marks(
 def test_a_source_inside_the_folder_that_is_replaced(
     where: str, head: Path, james_set: ExampleSet, mien: Mien, tmp_path: Path
 ) -> None:
-    write_examples(tmp_path / "ex", james_set)
+    save_examples(tmp_path / "ex", james_set)
     for command, folder in (("build", head), ("examples", tmp_path / "ex")):
         source = folder / where
         source.mkdir(exist_ok=True)

@@ -13,11 +13,11 @@ from PIL import Image
 
 from mien.arrays import Array
 from mien.assets.feature_points import load_feature_layout
-from mien.io.examples.example_folder import write_examples
+from mien.io.examples.example_folder import save_examples
 from mien.io.files.image import load_image
-from mien.io.landmarks.points_json import read_points_json
-from mien.io.landmarks.pts import points_to_ibug, write_pts
-from mien.io.landmarks.tem import points_to_tem, write_tem
+from mien.io.landmarks.points_json import load_points_json
+from mien.io.landmarks.pts import points_to_ibug, save_pts
+from mien.io.landmarks.tem import points_to_tem, save_tem
 from mien.pipelines.demo import demo_photos
 from mien.synthesis.examples.example_set import ExampleSet
 from terminal import Mien
@@ -31,7 +31,7 @@ Asked = Callable[..., Path]
 def folder(james_set: ExampleSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """His example folder. Read only."""
     place = tmp_path_factory.mktemp("examples") / "james"
-    write_examples(place, james_set)
+    save_examples(place, james_set)
     return place
 
 
@@ -75,7 +75,7 @@ def test_all_points_are_saved_and_can_be_asked_for_again(
     first, again, saved = tmp_path / "a.png", tmp_path / "b.png", tmp_path / "S.json"
     path = asked(neutral, *names)
     mien("synthesize", folder, "-o", first, "--points", path, "--save-points", saved)
-    points = read_points_json(saved, LAYOUT)
+    points = load_points_json(saved, LAYOUT)
     assert list(points) == list(LAYOUT.names)
     np.testing.assert_allclose(points["menton"], neutral[LAYOUT.index("menton")], atol=1e-3)
     mien("synthesize", folder, "-o", again, "--points", saved, "--head", "still")
@@ -98,9 +98,9 @@ def test_points_of_other_programs(
 ) -> None:
     path = tmp_path / f"a{suffix}"
     if suffix == ".tem":
-        write_tem(path, points_to_tem(LAYOUT, neutral))
+        save_tem(path, points_to_tem(LAYOUT, neutral))
     else:
-        write_pts(path, points_to_ibug(LAYOUT, neutral))
+        save_pts(path, points_to_ibug(LAYOUT, neutral))
     data = mien("synthesize", folder, "-o", tmp_path / "o.png", "--points", path, "--json").json
     assert data["notes"] == []
     photo = load_image(folder / "photos" / "e0.png").astype(float)
@@ -122,7 +122,7 @@ def test_a_head_that_moved_moves_the_picture(
     np.testing.assert_array_equal(load_image(out)[-20:, :20], photo[-20:, :20])
 
 
-def test_what_no_example_shows_is_told(
+def test_subregions_outside_of_the_hull_are_noted(
     mien: Mien, folder: Path, asked: Asked, neutral: Array, tmp_path: Path
 ) -> None:
     nose = [i for i, name in enumerate(LAYOUT.names) if name.startswith("nose")]
@@ -145,9 +145,7 @@ def test_the_geometry_of_a_photo(
     assert np.abs(load_image(out).astype(float) - photo).mean() < 8
 
 
-def test_another_persons_photo_is_used_and_told_of(
-    mien: Mien, folder: Path, tmp_path: Path
-) -> None:
+def test_another_persons_photo_is_used_and_noted(mien: Mien, folder: Path, tmp_path: Path) -> None:
     long = Image.open(demo_photos() / "photo_left.png").convert("RGB").resize((400, 680))
     long.save(tmp_path / "long.png")
     ran = mien("synthesize", folder, "-o", tmp_path / "o.png", "--photo", tmp_path / "long.png")
@@ -156,7 +154,7 @@ def test_another_persons_photo_is_used_and_told_of(
     assert "its points are taken as they are" in ran.err
 
 
-def test_a_face_that_the_photo_cuts_is_told_of(
+def test_a_face_that_the_photo_cuts_is_noted(
     mien: Mien, folder: Path, james_set: ExampleSet, tmp_path: Path
 ) -> None:
     """Through the mouth: the chin is a guess, the brows are not."""
@@ -170,7 +168,7 @@ def test_a_face_that_the_photo_cuts_is_told_of(
     assert "the edge cuts" not in ran.err
 
 
-def test_marks_beside_a_photo_win(
+def test_annotated_points_beside_a_photo_replace_detected_ones(
     mien: Mien, folder: Path, james_set: ExampleSet, tmp_path: Path
 ) -> None:
     Image.fromarray(james_set.neutral.photo).save(tmp_path / "a.png")
@@ -183,7 +181,7 @@ def test_marks_beside_a_photo_win(
     assert mien(*asked_of, "--json").json["hull_px"]["nose"] > 2
 
 
-def test_the_papers_ways_are_asked_for(
+def test_the_papers_options_reach_the_synthesizer(
     mien: Mien,
     folder: Path,
     asked: Asked,
@@ -248,7 +246,7 @@ def flipped(points: Array) -> Array:
     ],
     ids=["flipped", "exchanged", "far outside", "two", "one", "one place"],
 )
-def test_points_that_cannot_be_meant(
+def test_points_of_another_space_are_refused(
     mien: Mien,
     folder: Path,
     asked: Asked,
@@ -264,7 +262,7 @@ def test_points_that_cannot_be_meant(
     assert not (tmp_path / "o.png").exists()
 
 
-def test_points_a_little_outside_are_told_of(
+def test_points_a_little_outside_are_noted(
     mien: Mien, folder: Path, asked: Asked, neutral: Array, tmp_path: Path
 ) -> None:
     path = asked(neutral + np.array([0, SIZE[1] + 10 - neutral[:, 1].max()]))
@@ -341,7 +339,7 @@ def test_what_is_read_is_not_written_over(
     assert not out.exists()
 
 
-def test_options_of_the_other_way(
+def test_options_of_the_other_source_are_refused(
     mien: Mien, folder: Path, asked: Asked, neutral: Array, tmp_path: Path
 ) -> None:
     ask = ("synthesize", folder, "-o", tmp_path / "o.png", "--json")

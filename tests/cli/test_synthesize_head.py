@@ -14,7 +14,7 @@ from mien.arrays import Array
 from mien.assets.feature_points import load_feature_layout
 from mien.io.files.image import load_image
 from mien.io.head.head_folder import load_head
-from mien.io.landmarks.points_json import write_points_json
+from mien.io.landmarks.points_json import save_points_json
 from mien.synthesis.heads.feature_points import feature_points_on
 from terminal import Mien
 
@@ -60,7 +60,7 @@ def test_one_point_is_enough(
     assert off[150:].mean() > 5 * off[:100].mean()
 
 
-def test_what_no_expression_shows_is_told(
+def test_subregions_outside_of_the_hull_are_noted(
     mien: Mien, expressive: Path, points: dict[str, Array], asked: Asked, tmp_path: Path
 ) -> None:
     moved = points["neutral"].copy()
@@ -88,7 +88,7 @@ def test_the_face_of_a_photo(
     assert 0.1 < off.mean() < 8
 
 
-def test_a_face_that_does_not_look_like_the_head_is_told_of(
+def test_a_face_that_does_not_look_like_the_head_is_noted(
     mien: Mien, expressive: Path, bare_james: Path, tmp_path: Path
 ) -> None:
     """James from above, light and dark exchanged."""
@@ -119,7 +119,7 @@ def test_a_photo_without_a_face(mien: Mien, expressive: Path, wall: Array, tmp_p
         ),
     ],
 )
-def test_points_that_cannot_be_meant(
+def test_points_of_another_space_are_refused(
     mien: Mien,
     expressive: Path,
     points: dict[str, Array],
@@ -135,7 +135,7 @@ def test_points_that_cannot_be_meant(
 
 
 def test_points_of_a_picture_are_refused(mien: Mien, expressive: Path, tmp_path: Path) -> None:
-    write_points_json(tmp_path / "P.json", LAYOUT, {"menton": np.array([4.0, 5.0])})
+    save_points_json(tmp_path / "P.json", LAYOUT, {"menton": np.array([4.0, 5.0])})
     (tmp_path / "a.pts").write_text("")
     asking = ("synthesize", expressive, "-o", tmp_path / "o.png", "--json", "--points")
     error = mien(*asking, tmp_path / "P.json").error

@@ -25,13 +25,13 @@ from mien.assets.subregions import default_subregions, load_subregion_drawing
 from mien.capture.annotations import AnnotationNames, load_annotations
 from mien.capture.images.photos import Photo, load_photo
 from mien.errors import MienError
-from mien.io.examples.example_folder import load_examples, read_reasons, write_examples
+from mien.io.examples.example_folder import load_examples, load_reasons, save_examples
 from mien.io.files.image import encode_image, load_image
 from mien.io.head.head_folder import load_head, save_head
-from mien.io.landmarks.points_file import read_points, write_points
-from mien.io.live.live_link import write_live_link
-from mien.io.timeline.timeline_file import load_performance
-from mien.io.tracks.track_csv import write_track
+from mien.io.landmarks.points_file import load_feature_points, save_feature_points
+from mien.io.live.live_link_csv import save_live_link
+from mien.io.timeline.timeline_file import load_timeline
+from mien.io.tracks.track_csv import save_track
 from mien.io.tracks.track_journal import Journal, load_journal
 from mien.render.picture import HeadRenderer
 from mien.rig.state import FaceState
@@ -80,7 +80,7 @@ def read_head(folder: Path) -> None:
 
 
 def read_performance(path: Path) -> None:
-    timeline = load_performance(path)
+    timeline = load_timeline(path)
     times = frames_of(timeline)
     for moment in timeline.moments_at(times[:: max(1, len(times) // 5)]):
         assert np.isfinite(moment.rotation).all()
@@ -96,14 +96,14 @@ def readers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Reader]:
     for name in ("track", "journal", "live_link", "timeline", "points", "photos", "drawn"):
         (place / name).mkdir()
     track = random_track(rng)
-    write_track(place / "track" / "t.csv", track)
+    save_track(place / "track" / "t.csv", track)
     with Journal.start(place / "journal" / "t.csv.part", HEADER, track.frames):
         pass
     (place / "timeline" / "t.json").write_text(TIMELINE)
-    moments = load_performance(place / "timeline" / "t.json")
-    write_live_link(place / "live_link" / "t.csv", moments.moments_at(frames_of(moments)))
+    moments = load_timeline(place / "timeline" / "t.json")
+    save_live_link(place / "live_link" / "t.csv", moments.moments_at(frames_of(moments)))
     for suffix in ("json", "tem", "pts"):
-        write_points(place / "points" / f"p.{suffix}", layout, 100 * layout.template + 150)
+        save_feature_points(place / "points" / f"p.{suffix}", layout, 100 * layout.template + 150)
     pixels = rng.integers(0, 256, (20, 30, 3), np.uint8).repeat(10, axis=0).repeat(10, axis=1)
     for name, kind in (("a.png", "PNG"), ("b.jpg", "JPEG")):
         (place / "photos" / name).write_bytes(encode_image(pixels, kind))
@@ -115,13 +115,13 @@ def readers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Reader]:
         shutil.copy(data / name, place / "drawn" / name)
     read: dict[str, Callable[[Path], object]] = {
         "head": read_head,
-        "examples": lambda folder: (load_examples(folder), read_reasons(folder)),
+        "examples": lambda folder: (load_examples(folder), load_reasons(folder)),
         "track": lambda folder: read_performance(folder / "t.csv"),
         "journal": lambda folder: load_journal(folder / "t.csv.part", HEADER, LAYOUT),
         "live_link": lambda folder: read_performance(folder / "t.csv"),
         "timeline": lambda folder: read_performance(folder / "t.json"),
         "points": lambda folder: [
-            read_points(folder / f"p.{suffix}", layout) for suffix in ("json", "tem", "pts")
+            load_feature_points(folder / f"p.{suffix}", layout) for suffix in ("json", "tem", "pts")
         ],
         "photos": lambda folder: [
             (load_image(folder / name), load_photo(folder / name)) for name in ("a.png", "b.jpg")
@@ -146,14 +146,14 @@ def _write_examples(folder: Path) -> None:
         for name, place in zip(("rest", "joy"), points, strict=True)
     )
     subregions = default_subregions(layout, points[1], (110, 120))
-    write_examples(folder, ExampleSet(layout, examples, 1, np.stack(points), subregions))
+    save_examples(folder, ExampleSet(layout, examples, 1, np.stack(points), subregions))
     names = {f"members/{n}": m for n, m in zip(subregions.names, subregions.members, strict=True)}
     np.savez_compressed(
         folder / "subregions.npz", names=np.array(subregions.names), fades=subregions.fades, **names
     )
 
 
-def test_a_thousand_damaged_inputs_are_told_in_one_line(
+def test_a_thousand_damaged_inputs_raise_one_line_errors(
     readers: dict[str, Reader], tmp_path: Path
 ) -> None:
     others = [reader.files[-1].read_bytes() for reader in readers.values()]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mien.errors import EstimationError, InputError
-from mien.numeric.planar_similarity import PlanarMotion, estimate_planar_motion
+from mien.numeric.planar_similarity import PlanarSimilarity, estimate_planar_similarity
 
-TRUE = PlanarMotion(np.array(1.1), np.array(-0.3), np.array([40.0, -12.0]))
+TRUE = PlanarSimilarity(np.array(1.1), np.array(-0.3), np.array([40.0, -12.0]))
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def neutral(rng):
 
 
 def test_recovers_a_known_motion(neutral):
-    found = estimate_planar_motion(neutral, TRUE(neutral))
+    found = estimate_planar_similarity(neutral, TRUE(neutral))
     assert (found.a, found.b) == (pytest.approx(1.1), pytest.approx(-0.3))
     np.testing.assert_allclose(found.translation, TRUE.translation)
     assert found.scale == pytest.approx(np.hypot(1.1, 0.3))
@@ -30,30 +30,32 @@ def test_undo_undoes(rng, neutral):
 
 def test_any_other_motion_is_further_off(rng, neutral):
     target = TRUE(neutral) + rng.normal(size=neutral.shape)
-    found = estimate_planar_motion(neutral, target)
+    found = estimate_planar_similarity(neutral, target)
     best = np.sum((found(neutral) - target) ** 2)
     for nudge in 1e-3 * np.concatenate([np.eye(4), -np.eye(4)]):
-        moved = PlanarMotion(found.a + nudge[0], found.b + nudge[1], found.translation + nudge[2:])
+        moved = PlanarSimilarity(
+            found.a + nudge[0], found.b + nudge[1], found.translation + nudge[2:]
+        )
         assert np.sum((moved(neutral) - target) ** 2) > best
 
 
 def test_a_motion_turns_and_shifts_as_it_says():
     """From x to y, twice as large."""
-    turn = PlanarMotion(np.array(0.0), np.array(2.0), np.array([5.0, 1.0]))
+    turn = PlanarSimilarity(np.array(0.0), np.array(2.0), np.array([5.0, 1.0]))
     np.testing.assert_allclose(turn(np.array([[1.0, 0.0], [0.0, 1.0]])), [[5, 3], [3, 1]])
 
 
 def test_points_in_one_place_tell_nothing(neutral):
     with pytest.raises(EstimationError, match="those at rest share a place"):
-        estimate_planar_motion(np.full((20, 2), 7.0), neutral)
+        estimate_planar_similarity(np.full((20, 2), 7.0), neutral)
     with pytest.raises(EstimationError, match="those that moved share a place"):
-        estimate_planar_motion(neutral, np.full((20, 2), 7.0))
+        estimate_planar_similarity(neutral, np.full((20, 2), 7.0))
 
 
 def test_bad_input_is_named(neutral):
     with pytest.raises(InputError, match="source: expected at least 2 points, got 1"):
-        estimate_planar_motion(neutral[:1], neutral[:1])
+        estimate_planar_similarity(neutral[:1], neutral[:1])
     with pytest.raises(InputError, match="target: expected shape"):
-        estimate_planar_motion(neutral, neutral[:5])
+        estimate_planar_similarity(neutral, neutral[:5])
     with pytest.raises(InputError, match="source: expected finite numbers"):
-        estimate_planar_motion(np.full((5, 2), np.nan), neutral[:5])
+        estimate_planar_similarity(np.full((5, 2), np.nan), neutral[:5])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mien.arrays import Array
-from mien.numeric.signed_distance import depths_below
+from mien.numeric.signed_distance import penetration_depths
 
 
 def sphere(rings: int = 24, segments: int = 48) -> tuple[Array, Array]:
@@ -29,7 +29,7 @@ def test_depth_in_a_sphere_is_the_way_to_its_surface(rng: np.random.Generator) -
     radius = np.linalg.norm(points, axis=1)
     points, radius = points[np.abs(radius - 1) > 0.02], radius[np.abs(radius - 1) > 0.02]
     border = np.zeros(len(vertices), bool)
-    depth, triangle, weights = depths_below(points, vertices, triangles, border, 1.0)
+    depth, triangle, weights = penetration_depths(points, vertices, triangles, border, 1.0)
     np.testing.assert_allclose(depth, np.maximum(1 - radius, 0), atol=0.015)
     np.testing.assert_array_equal(triangle >= 0, radius < 1)
     inside = radius < 1
@@ -49,13 +49,13 @@ def test_depth_in_a_sphere_is_the_way_to_its_surface(rng: np.random.Generator) -
 )
 def test_a_single_triangle(point: tuple[float, float, float], expected: float) -> None:
     vertices, triangles = np.array([[-1.0, -1, 0], [1, -1, 0], [0, 2, 0]]), np.array([[0, 1, 2]])
-    depth = depths_below(np.array([point]), vertices, triangles, np.zeros(3, bool), 2.0)[0]
+    depth = penetration_depths(np.array([point]), vertices, triangles, np.zeros(3, bool), 2.0)[0]
     np.testing.assert_allclose(depth, [expected])
 
 
 def test_nothing_is_below_where_the_surface_ends() -> None:
     vertices, triangles = np.array([[-1.0, -1, 0], [1, -1, 0], [0, 2, 0]]), np.array([[0, 1, 2]])
     points = np.array([[0.0, 0.1, -0.5]])
-    depth, triangle, _ = depths_below(points, vertices, triangles, np.ones(3, bool), 2.0)
+    depth, triangle, _ = penetration_depths(points, vertices, triangles, np.ones(3, bool), 2.0)
     assert depth[0] == 0
     assert triangle[0] == -1

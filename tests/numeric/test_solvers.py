@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mien.errors import EstimationError
-from mien.numeric.solvers.anderson import Anderson
+from mien.numeric.solvers.anderson import AndersonAcceleration
 from mien.numeric.solvers.levenberg_marquardt import minimize_lm
 from mien.numeric.solvers.schur import BlockSystem
 
@@ -17,14 +17,14 @@ def test_anderson_solves_linear_maps_in_as_many_steps_as_unknowns(rng):
     matrix = (basis * np.linspace(0.5, 0.99, size)) @ basis.T
     shift = rng.normal(size=size)
     truth = np.linalg.solve(np.eye(size) - matrix, shift)
-    method, x = Anderson(depth=10, regularization=0), np.zeros(size)
+    method, x = AndersonAcceleration(depth=10, regularization=0), np.zeros(size)
     for _ in range(size + 1):
         x = method.propose(x, matrix @ x + shift)
     np.testing.assert_allclose(x, truth, rtol=1e-6)
 
 
 def test_anderson_without_history_is_the_plain_iteration(rng):
-    method = Anderson(depth=3)
+    method = AndersonAcceleration(depth=3)
     x, image = rng.normal(size=(2, 4))
     np.testing.assert_array_equal(method.propose(x, image), image)
     method.propose(image, image / 2)

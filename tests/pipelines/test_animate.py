@@ -18,7 +18,7 @@ from mien.animate.timeline import Timeline
 from mien.arrays import Array
 from mien.head import Head
 from mien.io.head.head_folder import load_head
-from mien.io.timeline.timeline_file import load_performance
+from mien.io.timeline.timeline_file import load_timeline
 from mien.pipelines.animate import Take, animate_head
 from mien.render.picture import HeadRenderer
 from terminal import Mien
@@ -113,7 +113,7 @@ def test_a_folder_of_pictures(
     assert mien("animate", timeline, "--head", expressive, "-o", out, "--json").json["frames"] == 5
     files = sorted(Path(out).iterdir())
     assert [file.name for file in files] == [f"frame_{i:06}.png" for i in range(5)]
-    renderer, played = HeadRenderer(load_head(expressive)), load_performance(timeline)
+    renderer, played = HeadRenderer(load_head(expressive)), load_timeline(timeline)
     moment = played.at(0.4)
     camera = renderer.camera(size=SIZE)
     turned = type(camera)(
@@ -146,7 +146,7 @@ def middle_of(head: Head) -> Array:
 def test_live_link_comes_back(expressive: Path, timeline: Path, mien: Mien, tmp_path: Path) -> None:
     out = tmp_path / "a.csv"
     assert mien("animate", timeline, "--head", expressive, "-o", out, "--json").json["frames"] == 5
-    given, back = load_performance(timeline), load_performance(out)
+    given, back = load_timeline(timeline), load_timeline(out)
     times = frames_of(given)
     wanted, found = given.sample(times), back.sample(times)
     for channel in ("units.jawOpen", "units.eyeBlinkLeft", "head.yaw"):
@@ -157,7 +157,7 @@ def test_live_link_comes_back(expressive: Path, timeline: Path, mien: Mien, tmp_
 def test_live_link_has_the_units_of_the_expressions(expressive: Path, tmp_path: Path) -> None:
     tracks = {"face": {"joy": 0.5}, "right_mouth": {"joy": -0.25}, "units": {"mouthSmileLeft": 0.1}}
     animate_head(load_head(expressive), written(tmp_path, tracks), tmp_path / "a.csv")
-    values = load_performance(tmp_path / "a.csv").sample(np.zeros(1))
+    values = load_timeline(tmp_path / "a.csv").sample(np.zeros(1))
     assert values["units.mouthSmileLeft"] == pytest.approx(0.6)
     assert values["units.mouthSmileRight"] == pytest.approx(0.25)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mien.assets.generic import load_generic_head
-from mien.capture.source import Capture, View
+from mien.capture.source import Capture, CapturedView
 from mien.errors import EstimationError
 from mien.pipelines.build import Build, BuildOptions, build_head
 from mien.reconstruction.fit import FitOptions
@@ -25,7 +25,7 @@ MARKS = [*GENERIC.points, *(f"{name}.3" for name in GENERIC.polylines)]
 OPTIONS = BuildOptions(fit=FitOptions(rounds=1), texture_size=32)
 
 
-def view(name: str, yaw: float, *, seed: int = 2, points: list[str] | None = None) -> View:
+def view(name: str, yaw: float, *, seed: int = 2, points: list[str] | None = None) -> CapturedView:
     return photographed(person(seed), camera(yaw), name=name, points=points or MARKS)
 
 

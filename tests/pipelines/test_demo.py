@@ -13,7 +13,7 @@ from PIL import Image
 
 from mien.assets.generic import load_generic_head
 from mien.io.head.head_folder import load_head
-from mien.io.timeline.timeline_json import load_timeline
+from mien.io.timeline.timeline_json import load_timeline_json
 from mien.pipelines.demo import PERFORMANCE, TURNTABLE, UNITS, YAWS, demo_photos, run_demo
 from terminal import SHORT_TURNTABLE, Mien, Ran
 
@@ -89,7 +89,7 @@ def test_the_sample_timeline_is_performed_and_shown(demo: Path) -> None:
     assert max(moved) > 2
     page = (demo / "index.html").read_text(encoding="utf-8")
     assert f'<video src="{PERFORMANCE}"' in page
-    assert load_timeline(demo / "sample_timeline.json").duration == 10
+    assert load_timeline_json(demo / "sample_timeline.json").duration == 10
 
 
 def test_the_glb_is_whole(demo: Path) -> None:

@@ -1,4 +1,4 @@
-"""Hand marks on photos that become examples: they win, and their neighbours follow."""
+"""Annotated points on photos that become examples replace detected ones; neighbours follow."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from mien.arrays import Array
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.images.photos import Photo
 from mien.errors import FileFormatError
-from mien.io.landmarks.pts import points_to_ibug, write_pts
-from mien.io.landmarks.tem import points_to_tem, write_tem
+from mien.io.landmarks.pts import points_to_ibug, save_pts
+from mien.io.landmarks.tem import points_to_tem, save_tem
 from mien.pipelines.example_annotations import (
     annotation_notes,
     apply_annotations,
-    read_annotated_points,
+    load_annotated_points,
 )
 
 
@@ -45,49 +45,49 @@ def annotate(photo: Photo, **data: object) -> None:
     (folder / "anna.json").write_text(json.dumps(data))
 
 
-def test_no_marks(layout: FeatureLayout, points: Array, photo: Photo) -> None:
-    assert read_annotated_points(photo.path, photo, layout) == {}
+def test_no_annotations(layout: FeatureLayout, points: Array, photo: Photo) -> None:
+    assert load_annotated_points(photo.path, photo, layout) == {}
     assert apply_annotations(layout, points, {}) is points
 
 
 def test_all_points_from_a_delineation(layout: FeatureLayout, points: Array, photo: Photo) -> None:
-    write_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
-    marks = read_annotated_points(photo.path, photo, layout)
-    found = apply_annotations(layout, 100 + 0 * points + layout.template, marks)
+    save_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
+    annotated = load_annotated_points(photo.path, photo, layout)
+    found = apply_annotations(layout, 100 + 0 * points + layout.template, annotated)
     np.testing.assert_allclose(found, points / 2, atol=1e-3)
 
 
 def test_some_points_from_ibug(layout: FeatureLayout, points: Array, photo: Photo) -> None:
-    write_pts(photo.path.with_suffix(".pts"), points_to_ibug(layout, points))
-    marks = read_annotated_points(photo.path, photo, layout)
-    assert 30 <= len(marks) <= 40
-    for name, place in marks.items():
+    save_pts(photo.path.with_suffix(".pts"), points_to_ibug(layout, points))
+    annotated = load_annotated_points(photo.path, photo, layout)
+    assert 30 <= len(annotated) <= 40
+    for name, place in annotated.items():
         np.testing.assert_allclose(place, points[layout.index(name)] / 2, atol=1e-3)
 
 
 def test_points_of_the_layout_in_json(layout: FeatureLayout, photo: Photo) -> None:
     annotate(photo, layout=layout.name, points={"chin": [200, 500], "right_jaw.0": [150, 480]})
-    marks = read_annotated_points(photo.path, photo, layout)
-    np.testing.assert_array_equal(marks["chin"], [100, 250])
-    np.testing.assert_array_equal(marks["right_jaw.0"], [75, 240])
+    annotated = load_annotated_points(photo.path, photo, layout)
+    np.testing.assert_array_equal(annotated["chin"], [100, 250])
+    np.testing.assert_array_equal(annotated["right_jaw.0"], [75, 240])
 
 
-def test_marks_made_for_a_head_count_where_they_mean_the_same(
+def test_annotations_for_heads_count_where_they_are_the_same_points(
     layout: FeatureLayout, photo: Photo
 ) -> None:
     """`left_jaw.3` is another place on the head than among the feature points."""
     annotate(photo, points={"nose_tip": [200, 300], "left_jaw.3": [250, 480], "chin": [200, 500]})
-    marks = read_annotated_points(photo.path, photo, layout)
-    assert list(marks) == ["nose_tip"]
-    np.testing.assert_array_equal(marks["nose_tip"], [100, 150])
+    annotated = load_annotated_points(photo.path, photo, layout)
+    assert list(annotated) == ["nose_tip"]
+    np.testing.assert_array_equal(annotated["nose_tip"], [100, 150])
 
 
-def test_json_counts_more_than_a_delineation(
+def test_json_takes_precedence_over_a_delineation(
     layout: FeatureLayout, points: Array, photo: Photo
 ) -> None:
-    write_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
+    save_tem(photo.path.with_suffix(".tem"), points_to_tem(layout, points))
     annotate(photo, layout=layout.name, points={"chin": [10, 20]})
-    np.testing.assert_array_equal(read_annotated_points(photo.path, photo, layout)["chin"], [5, 10])
+    np.testing.assert_array_equal(load_annotated_points(photo.path, photo, layout)["chin"], [5, 10])
 
 
 @pytest.mark.parametrize(
@@ -100,12 +100,12 @@ def test_json_counts_more_than_a_delineation(
         ({"points": {"chinn": [1, 2]}}, "points.chinn: unknown name; did you mean chin"),
     ],
 )
-def test_broken_marks(
+def test_broken_annotations(
     layout: FeatureLayout, photo: Photo, data: dict[str, object], message: str
 ) -> None:
     annotate(photo, **data)
     with pytest.raises(FileFormatError, match=message) as caught:
-        read_annotated_points(photo.path, photo, layout)
+        load_annotated_points(photo.path, photo, layout)
     assert "anna.json" in str(caught.value)
 
 
@@ -113,8 +113,8 @@ def test_points_of_other_kinds_are_noted_and_not_used(layout: FeatureLayout, pho
     annotate(photo, layout=layout.name, points={"chin": [200, 500]})
     assert annotation_notes(photo.path, layout) == []
     photo.path.with_suffix(".tem").write_text("2\n1 2\n3 4\n0\n")
-    write_pts(photo.path.with_suffix(".pts"), np.zeros((5, 2)))
-    assert list(read_annotated_points(photo.path, photo, layout)) == ["chin"]
+    save_pts(photo.path.with_suffix(".pts"), np.zeros((5, 2)))
+    assert list(load_annotated_points(photo.path, photo, layout)) == ["chin"]
     template, ibug = annotation_notes(photo.path, layout)
     assert template.startswith("anna.tem is not used: expected 134 points (zhang134), 7 (dlib's 5")
     assert template.endswith(", found 2")
@@ -124,14 +124,14 @@ def test_points_of_other_kinds_are_noted_and_not_used(layout: FeatureLayout, pho
 def test_a_damaged_delineation_is_no_other_kind(layout: FeatureLayout, photo: Photo) -> None:
     photo.path.with_suffix(".tem").write_text("2\n1 2\n3 x\n0\n")
     for read in (
-        lambda: read_annotated_points(photo.path, photo, layout),
+        lambda: load_annotated_points(photo.path, photo, layout),
         lambda: annotation_notes(photo.path, layout),
     ):
         with pytest.raises(FileFormatError, match=r"anna\.tem: line 3: expected a finite number"):
             read()
 
 
-def test_neighbours_follow_and_the_far_stay(layout: FeatureLayout, points: Array) -> None:
+def test_neighbours_follow_and_far_points_stay(layout: FeatureLayout, points: Array) -> None:
     corner = layout.index("right_mouth_corner")
     moved = np.array([6.0, -4.0])
     found = apply_annotations(layout, points, {"right_mouth_corner": points[corner] + moved})
@@ -143,8 +143,8 @@ def test_neighbours_follow_and_the_far_stay(layout: FeatureLayout, points: Array
     assert steps.min() >= 0
 
 
-def test_marks_that_agree_move_all_between_them_alike(layout: FeatureLayout, points: Array) -> None:
+def test_annotations_that_agree_move_all_points_alike(layout: FeatureLayout, points: Array) -> None:
     names = [name for name in layout.names if name != "chin"]
-    marks = {name: points[layout.index(name)] + [3, 1] for name in names}
-    found = apply_annotations(layout, points, marks)
+    annotated = {name: points[layout.index(name)] + [3, 1] for name in names}
+    found = apply_annotations(layout, points, annotated)
     np.testing.assert_allclose(found - points, np.tile([3, 1], (len(points), 1)), atol=0.2)

@@ -1,4 +1,4 @@
-"""Examples of real people, as far as it shows whether they are right."""
+"""Examples of real people."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def test_a_hand_before_the_mouth(shared: Path) -> None:
             assert face is not None
             lips(pixels, face.points[:, :2])
             index.append(frame.index)
-    numbers, covered = np.array(index), lips.covered()
+    numbers, occluded = np.array(index), lips.occluded()
     hand = (numbers >= 60) & (numbers <= 222)
-    assert covered[hand].mean() > 0.5
-    assert not covered[(numbers < 50) | (numbers > 240)].any()
-    assert lips.covered(numbers / 24)[hand].all()
+    assert occluded[hand].mean() > 0.5
+    assert not occluded[(numbers < 50) | (numbers > 240)].any()
+    assert lips.occluded(numbers / 24)[hand].all()

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from mien.assets.generic import load_generic_head
 from mien.capture.annotations import Annotations
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.errors import InputError
 from mien.reconstruction.features import (
     CURVE_SIGMA_MM,
@@ -36,7 +36,7 @@ def is_landmark(features: Features) -> np.ndarray:
     return np.array([name.startswith("landmark") for name in features.names])
 
 
-def without_confidence(view: View, numbers: list[int], confidence: float) -> View:
+def without_confidence(view: CapturedView, numbers: list[int], confidence: float) -> CapturedView:
     assert view.landmarks is not None
     known = np.array(view.landmarks.confidence)
     known[numbers] = confidence

@@ -15,7 +15,7 @@ from mien.assets.generic import load_generic_head
 from mien.assets.landmark_sets import EYES, LIPS
 from mien.camera import Camera
 from mien.capture.annotations import Annotations
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.similarity import estimate_similarity
 from mien.reconstruction import fit as fitting
@@ -38,7 +38,7 @@ PERSON = person(0)
 FEATURES = np.unique(feature_vertices(GENERIC.feature_names))
 
 
-def views_of(seen_from: list[Camera], **marks: object) -> list[View]:
+def views_of(seen_from: list[Camera], **marks: object) -> list[CapturedView]:
     return [
         photographed(PERSON, item, name=f"{k}.png", **marks) for k, item in enumerate(seen_from)
     ]
@@ -144,14 +144,14 @@ def test_uncertainty_is_least_at_what_was_marked() -> None:
     assert np.median(uncertainty[FEATURES]) < 0.8 * np.median(uncertainty)
 
 
-def shuffled(view: View) -> View:
+def shuffled(view: CapturedView) -> CapturedView:
     assert view.annotations is not None
     points = view.annotations.points
     places = np.random.default_rng(0).permutation(list(points.values()))
     return replace(view, annotations=Annotations(dict(zip(points, places, strict=True))))
 
 
-def mirrored(view: View) -> View:
+def mirrored(view: CapturedView) -> CapturedView:
     assert view.annotations is not None
     flip = np.array([-1, 1])
     points = view.annotations.points.items()
@@ -161,12 +161,14 @@ def mirrored(view: View) -> View:
     )
 
 
-def somebody_else(view: View) -> View:
+def somebody_else(view: CapturedView) -> CapturedView:
     return photographed(person(11), FIVE[0], name=view.photo.name, points=MARKS)
 
 
 @pytest.mark.parametrize("wrong", [shuffled, mirrored, somebody_else])
-def test_a_wrong_photo_is_named_and_changes_nothing(wrong: Callable[[View], View]) -> None:
+def test_a_wrong_photo_is_named_and_changes_nothing(
+    wrong: Callable[[CapturedView], CapturedView],
+) -> None:
     view = photographed(PERSON, FIVE[0], name="wrong.png", points=MARKS)
     views = [wrong(view), *views_of(FIVE[1:4], points=MARKS)]
     fit = fit_views(views, GENERIC, QUICK)

@@ -10,7 +10,7 @@ from expressive import NEUTRAL, exactly_detected, neutral_photo
 from marbled import GENERIC, Person, at, clutter, photographed
 from mien.capture.annotations import Annotations
 from mien.capture.images.photos import Photo
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
 from mien.reconstruction import registration
@@ -52,9 +52,9 @@ def solution_of(photos: list) -> Solution:
     return Solution(views, features, cameras, vertices, residuals, np.ones(len(vertices)), {})
 
 
-def faceless(pixels: np.ndarray, name: str) -> View:
+def faceless(pixels: np.ndarray, name: str) -> CapturedView:
     grey = np.clip(pixels, 0, 255).astype(np.uint8)
-    return View(Photo(name, Path(name), np.repeat(grey[..., None], 3, axis=2)), None, None)
+    return CapturedView(Photo(name, Path(name), np.repeat(grey[..., None], 3, axis=2)), None, None)
 
 
 def test_a_profile_is_placed_and_a_landscape_is_not(start: Solution) -> None:

@@ -38,7 +38,7 @@ def faces(layout: FeatureLayout, count: int) -> ExampleSet:
     return ExampleSet(layout, tuple(examples), 0, examples[0].points[None], everywhere, (1,))
 
 
-def test_every_face_is_shown_alike_whatever_its_photo(layout: FeatureLayout) -> None:
+def test_every_face_has_the_same_size_whatever_its_photo(layout: FeatureLayout) -> None:
     sheet = example_sheet(faces(layout, 3), {"frame_1": "chosen"}, columns=2)
     width = (sheet.shape[1] - 4) // 2
     height = (sheet.shape[0] - 4) // 2
@@ -51,7 +51,7 @@ def test_every_face_is_shown_alike_whatever_its_photo(layout: FeatureLayout) -> 
     np.testing.assert_allclose(reds[1:], [reds[0]] * 2, atol=3)
 
 
-def test_words_are_under_the_face(layout: FeatureLayout) -> None:
+def test_the_caption_is_under_the_face(layout: FeatureLayout) -> None:
     """No reason, one line; a reason, more ink. Nothing but paper beside the last one."""
     shown = faces(layout, 3)
     bare = example_sheet(shown, {}, columns=3)

@@ -1,4 +1,4 @@
-"""Pictures of a sequence follow its geometry: no step of theirs is larger than that asks for.
+"""Pictures of a sequence change no more than its geometry does.
 
 Each picture is made on its own ([Zhang 2006] section 14.1). A picture that jumped somewhere would
 differ from the one before by the same amount however short the time between them; one that follows
@@ -23,11 +23,11 @@ from mien.synthesis.synthesizer import SynthesisOptions, Synthesizer
 
 LAYOUT = load_feature_layout()
 STEPS = 8
-OPTIONS = {"usual": SynthesisOptions(), "paper": SynthesisOptions.paper()}
+OPTIONS = {"default": SynthesisOptions(), "paper": SynthesisOptions.paper()}
 
 
 def painted(size, number):
-    """A pattern that all examples have and, as strong, wrinkles that no other one has."""
+    """A pattern that all examples have and, as strong, wrinkles of its own."""
     width, height = size
     y, x = np.mgrid[:height, :width] + 0.5
     turns = [0.7 * number + channel for channel in range(3)]
@@ -44,12 +44,16 @@ def person():
     neutral = (LAYOUT.template - LAYOUT.template.mean(0)) * 130 + [100, 125]
     x, y = LAYOUT.template.T
     wave, phase = rng.normal(0, 6, (2, 8, 2)), rng.uniform(0, 6, (2, 8))
-    ways = np.sin(wave[..., :1] * x + wave[..., 1:] * y + phase[..., None])
-    seen = neutral + np.einsum("awn,mw->mna", ways, rng.normal(0, 2.0, (14, 8)))
-    pairs = enumerate([neutral, *seen[:9]])
+    modes = np.sin(wave[..., :1] * x + wave[..., 1:] * y + phase[..., None])
+    expressions = neutral + np.einsum("awn,mw->mna", modes, rng.normal(0, 2.0, (14, 8)))
+    pairs = enumerate([neutral, *expressions[:9]])
     examples = tuple(Example(f"e{i}", painted(size, i), points, "") for i, points in pairs)
-    subregions = default_subregions(LAYOUT, seen[0], size)
-    return ExampleSet(LAYOUT, examples, 1, seen, subregions), [neutral, *seen[9:], neutral]
+    subregions = default_subregions(LAYOUT, expressions[0], size)
+    return ExampleSet(LAYOUT, examples, 1, expressions, subregions), [
+        neutral,
+        *expressions[9:],
+        neutral,
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -72,9 +76,9 @@ def filmed(shared: Path):
 
 
 def path_of(keys, steps):
-    """Points on the way between key geometries, in steps alike between two of them."""
-    shares = np.arange(steps) / steps
-    parts = [a + (b - a) * shares[:, None, None] for a, b in pairwise(keys)]
+    """Points interpolated between key geometries, in equal steps between two of them."""
+    fractions = np.arange(steps) / steps
+    parts = [a + (b - a) * fractions[:, None, None] for a, b in pairwise(keys)]
     return np.concatenate([*parts, [keys[-1]]])
 
 
@@ -86,7 +90,7 @@ def picture_steps(example_set, keys, steps, options):
     hull = cv2.convexHull(example_set.neutral.points.astype(np.float32)).astype(np.int32)
     cv2.fillConvexPoly(face, hull, 1)
     points = path_of(keys, steps)
-    pictures = [synthesizer.synthesize(place).image[face > 0].astype(np.int16) for place in points]
+    pictures = [synthesizer.synthesize(own).image[face > 0].astype(np.int16) for own in points]
     moved = np.linalg.norm(np.diff(points, axis=0), axis=2).mean(axis=1)
     differences = np.array([np.abs(b - a).mean() for a, b in pairwise(pictures)])
     return differences, differences / moved
@@ -106,26 +110,26 @@ def test_a_sequence_steps_no_farther_than_its_geometry(who, most, options, reque
 
 @pytest.mark.parametrize("teeth", [(), (2, 5, 7)])
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
-def test_shares_do_not_jump(person, options, teeth):
-    """Where they change fastest, nearer and nearer places have nearer and nearer shares."""
+def test_coefficients_do_not_jump(person, options, teeth):
+    """Where they change fastest, ever nearer geometries have ever nearer coefficients."""
     example_set, keys = replace(person[0], teeth=teeth), person[1]
 
-    def shares(place):
+    def mixture(points):
         tied, penalty = options.tied, options.distance_penalty
-        return coefficients(example_set, place, distance_penalty=penalty, tied=tied)
+        return coefficients(example_set, points, distance_penalty=penalty, tied=tied)
 
-    places = path_of(keys, STEPS)
-    found = [shares(place) for place in places]
+    path = path_of(keys, STEPS)
+    found = [mixture(points) for points in path]
     steps = [np.abs(b - a).sum(axis=1).max() for a, b in pairwise(found)]
     first = int(np.argmax(steps))
-    near, far = places[first], places[first + 1]
-    apart = []
+    near, far = path[first], path[first + 1]
+    differences = []
     for _ in range(10):
         middle = (near + far) / 2
         before, after = (
-            np.abs(shares(a) - shares(b)).sum(axis=1).max()
+            np.abs(mixture(a) - mixture(b)).sum(axis=1).max()
             for a, b in ((near, middle), (middle, far))
         )
-        apart.append(max(before, after))
+        differences.append(max(before, after))
         near, far = (near, middle) if before > after else (middle, far)
-    assert apart[-1] < 0.02 * max(steps)
+    assert differences[-1] < 0.02 * max(steps)

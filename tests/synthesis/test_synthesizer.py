@@ -11,12 +11,12 @@ from hull import hull_distances
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
 from mien.errors import EstimationError, InputError
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.synthesis.examples.example_set import Example, ExampleSet
 from mien.synthesis.synthesizer import Synthesis, SynthesisOptions, Synthesizer
 
 WIDTH, HEIGHT = 160, 200
-MOVED = PlanarMotion(np.array(1.1), np.array(0.15), np.array([-20.0, 4.0]))
+MOVED = PlanarSimilarity(np.array(1.1), np.array(0.15), np.array([-20.0, 4.0]))
 
 
 @pytest.fixture(scope="module")
@@ -26,34 +26,34 @@ def layout():
 
 @pytest.fixture(scope="module")
 def person(layout):
-    """Six examples; four ways to move of which every expression is a sum."""
+    """Six examples; four modes of which every expression is a sum."""
     rng = np.random.default_rng(5)
     base = layout.template - layout.template.mean(0)
     neutral = base * 0.6 * WIDTH + [WIDTH / 2, HEIGHT / 2]
-    ways = np.stack([_smooth_way(rng, base) for _ in range(4)])
-    places = [neutral, *(neutral + np.tensordot(row, ways, 1) for row in rng.normal(0, 1, (5, 4)))]
-    seen = neutral + np.tensordot(rng.normal(0, 1, (60, 4)), ways, 1)
+    modes = np.stack([_smooth_mode(rng, base) for _ in range(4)])
+    places = [neutral, *(neutral + np.tensordot(row, modes, 1) for row in rng.normal(0, 1, (5, 4)))]
+    expressions = neutral + np.tensordot(rng.normal(0, 1, (60, 4)), modes, 1)
     photos = [rng.integers(0, 256, (HEIGHT, WIDTH, 3), np.uint8) for _ in places]
     pairs = enumerate(zip(photos, places, strict=True))
     examples = tuple(Example(f"e{i}", photo, points, f"{i}.png") for i, (photo, points) in pairs)
     subregions = default_subregions(layout, places[1], (WIDTH, HEIGHT))
-    example_set = ExampleSet(layout, examples, 1, seen, subregions)
-    return replace(example_set, statistics=example_set.geometry(seen)), ways
+    example_set = ExampleSet(layout, examples, 1, expressions, subregions)
+    return replace(example_set, statistics=example_set.geometry(expressions)), modes
 
 
-def _smooth_way(rng, base):
+def _smooth_mode(rng, base):
     """A displacement of all points that varies smoothly over the face, some px large."""
     phase, wave = rng.uniform(0, 6, 2), rng.normal(0, 4, (2, 2))
     return 1.5 * np.stack([np.sin(base @ wave[i] + phase[i]) for i in (0, 1)], axis=-1)
 
 
 def new_expression(person):
-    example_set, ways = person
-    return example_set.neutral.points + np.tensordot([0.6, -0.8, 0.3, 0.5], ways, 1)
+    example_set, modes = person
+    return example_set.neutral.points + np.tensordot([0.6, -0.8, 0.3, 0.5], modes, 1)
 
 
 @pytest.mark.parametrize("count", [12, 40])
-def test_points_are_completed_whatever_the_head_did(person, count):
+def test_points_are_completed_whatever_the_head_motion(person, count):
     example_set, _ = person
     truth = MOVED(new_expression(person))
     known = np.random.default_rng(count).permutation(len(truth))[:count]
@@ -200,7 +200,7 @@ def test_a_moved_head_is_drawn_where_it_is(person):
     synthesizer = Synthesizer(person[0])
     points = new_expression(person)
     still = synthesizer.synthesize(points).image
-    shift = PlanarMotion(np.array(1.0), np.array(0.0), np.array([7.0, 4.0]))
+    shift = PlanarSimilarity(np.array(1.0), np.array(0.0), np.array([7.0, 4.0]))
     moved = synthesizer.synthesize(shift(points), motion=shift, size=(WIDTH + 30, HEIGHT)).image
     assert moved.shape == (HEIGHT, WIDTH + 30, 3)
     difference = moved[4:, 7 : WIDTH + 7].astype(int) - still[:-4]

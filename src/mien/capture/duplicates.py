@@ -10,14 +10,14 @@ from mien.arrays import Array, Float, UInt8
 from mien.capture.faces.landmarks import Landmarks
 
 if TYPE_CHECKING:
-    from mien.capture.source import View
+    from mien.capture.source import CapturedView
 
 _THUMBNAIL = 32
 _SAME_BRIGHTNESS = 1.0
 _SAME_PLACE = 0.02
 
 
-def same_photo(one: View, other: View) -> bool:
+def same_photo(one: CapturedView, other: CapturedView) -> bool:
     """Equal pixels, or a copy that was saved again or resized.
 
     Copies differ by some tenths of a grey level in the mean of a 32x32 thumbnail, and in their

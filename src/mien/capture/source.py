@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 
 from mien.capture.annotations import AnnotationNames, Annotations, load_annotations
 from mien.capture.duplicates import same_photo
-from mien.capture.faces.detector import NO_FACE, LandmarkDetector, NoFaceError
+from mien.capture.faces.detector import NO_FACE_FOUND, LandmarkDetector, NoFaceError
 from mien.capture.faces.landmarks import Landmarks
 from mien.capture.faces.mediapipe_face import yaw_pitch
 from mien.capture.folder import (
@@ -20,15 +19,13 @@ from mien.capture.folder import (
     orphaned_annotations,
     photo_files,
 )
-from mien.capture.images.photos import MAX_SIDE, Photo, load_photo
+from mien.capture.images.photos import DEFAULT_MAX_SIDE, Photo, load_photo
 from mien.capture.notes import gathered_notes
 from mien.capture.source_kind import kind_of_source
 from mien.capture.video.picked_frames import pick_frames
 from mien.errors import EstimationError
-from mien.reading.names import plain_name
-
-Progress = Callable[[int, int], None]
-"""Called with the number of steps done and their total."""
+from mien.progress import StepProgress
+from mien.reading.names import portable_name
 
 TO_BE_PLACED = "no face found; the other photos tell where it was taken from, if they can"
 """Noted of a photo that shows a profile, perhaps, or nobody."""
@@ -37,7 +34,7 @@ _ONE_VIEWPOINT = 10.0
 
 
 @dataclass(frozen=True)
-class View:
+class CapturedView:
     """One photo of the person and what is known of the face in it.
 
     Attributes:
@@ -68,11 +65,11 @@ class Capture:
     """
 
     name: str
-    expressions: dict[str, tuple[View, ...]]
+    expressions: dict[str, tuple[CapturedView, ...]]
     notes: tuple[str, ...] = ()
 
     @property
-    def views(self) -> tuple[View, ...]:
+    def views(self) -> tuple[CapturedView, ...]:
         """Every view of every expression, in order."""
         return tuple(view for views in self.expressions.values() for view in views)
 
@@ -80,12 +77,12 @@ class Capture:
 def load_capture(
     source: str | Path,
     *,
-    max_side: int = MAX_SIDE,
+    max_side: int = DEFAULT_MAX_SIDE,
     face: int | None = None,
     frames: int = 7,
     expressions: int | None = None,
     names: AnnotationNames | None = None,
-    progress: Progress | None = None,
+    progress: StepProgress | None = None,
 ) -> Capture:
     """Photos from a folder, expression folders, one photo or a video, with all that is known.
 
@@ -122,7 +119,7 @@ def load_capture(
             f"{source}: no photo shows a face that can be used ({'; '.join(reasons[:3])})"
         )
     notes = (*reader.notes, *gathered_notes(reader.told), *_viewpoint_notes(found))
-    name = plain_name(source.with_suffix("") if source.is_file() else source.resolve())
+    name = portable_name(source.with_suffix("") if source.is_file() else source.resolve())
     return Capture(name, found, notes)
 
 
@@ -135,21 +132,21 @@ class _Reader:
         max_side: int,
         face: int | None,
         names: AnnotationNames | None,
-        progress: Progress | None,
+        progress: StepProgress | None,
     ) -> None:
         self.detector, self.max_side, self.face = detector, max_side, face
         self.names, self.progress = names, progress
         self.notes: list[str] = []
         self.told: list[tuple[str, str]] = []
 
-    def from_photos(self, source: Path) -> dict[str, tuple[View, ...]]:
+    def from_photos(self, source: Path) -> dict[str, tuple[CapturedView, ...]]:
         """Every photo of every expression, each with the annotations beside it."""
         files = photo_files(source)
         self.notes += ignored_files(source)
         total, done = sum(map(len, files.values())), 0
-        expressions: dict[str, tuple[View, ...]] = {}
+        expressions: dict[str, tuple[CapturedView, ...]] = {}
         for expression, paths in files.items():
-            views: list[View] = []
+            views: list[CapturedView] = []
             for path in paths:
                 photo = load_photo(path, max_side=self.max_side)
                 self._add(views, photo, self._annotations_of(path, photo))
@@ -162,7 +159,7 @@ class _Reader:
 
     def from_video(
         self, source: Path, count: int, expressions: int | None
-    ) -> dict[str, tuple[View, ...]]:
+    ) -> dict[str, tuple[CapturedView, ...]]:
         """The chosen frames by expression."""
         picked = pick_frames(
             source,
@@ -172,16 +169,18 @@ class _Reader:
             max_side=self.max_side,
             progress=self.progress,
         )
-        self.notes += [f"{plain_name(source)}: {note}" for note in picked.notes]
+        self.notes += [f"{portable_name(source)}: {note}" for note in picked.notes]
         found = {}
         for name, photos in picked.expressions.items():
-            views: list[View] = []
+            views: list[CapturedView] = []
             for photo in photos:
                 self._add(views, photo, None)
             found[name] = self._settled(views)
         return found
 
-    def _add(self, views: list[View], photo: Photo, annotations: Annotations | None) -> None:
+    def _add(
+        self, views: list[CapturedView], photo: Photo, annotations: Annotations | None
+    ) -> None:
         """The photo as another view, unless its face is of no use or it is there already."""
         notes = list(photo.notes)
         landmarks, usable = None, True
@@ -198,7 +197,7 @@ class _Reader:
         if annotations is not None:
             notes += annotations.notes
         if usable:
-            view = View(photo, landmarks, annotations)
+            view = CapturedView(photo, landmarks, annotations)
             twin = next((other for other in views if same_photo(view, other)), None)
             if twin is None or annotations is not None:
                 views.append(view)
@@ -206,10 +205,10 @@ class _Reader:
                 notes.append(f"left out: the same photo as {twin.photo.name}")
         self.told += [(photo.name, note) for note in notes]
 
-    def _settled(self, views: list[View]) -> tuple[View, ...]:
+    def _settled(self, views: list[CapturedView]) -> tuple[CapturedView, ...]:
         """Photos without a face stay if any other photo of the expression has one."""
         anchored = any(view.marked for view in views)
-        what = TO_BE_PLACED if anchored else f"left out: {NO_FACE}"
+        what = TO_BE_PLACED if anchored else f"left out: {NO_FACE_FOUND}"
         self.told += [(view.photo.name, what) for view in views if not view.marked]
         return tuple(views) if anchored else ()
 
@@ -227,7 +226,7 @@ def _generic_names() -> AnnotationNames:
     return AnnotationNames.of(load_generic_head())
 
 
-def _viewpoint_notes(expressions: dict[str, tuple[View, ...]]) -> list[str]:
+def _viewpoint_notes(expressions: dict[str, tuple[CapturedView, ...]]) -> list[str]:
     """A note where several photos show the head from one side only."""
     notes = []
     for name, views in expressions.items():

@@ -56,7 +56,7 @@ def examples(
     json_: Json = False,
 ) -> None:
     """Photos or a video to a set of examples that expressions are mixed from."""
-    from mien.pipelines.examples import COUNTED, ExampleRequest, write_example_folder
+    from mien.pipelines.examples import COUNTED, ExampleRequest, save_example_folder
 
     request = ExampleRequest(
         count=count,
@@ -69,22 +69,23 @@ def examples(
         even=even,
     )
     with terminal_progress(json_, counted=COUNTED) as progress:
-        gathered = write_example_folder(source, output, request=request, progress=progress)
-    found = gathered.examples
-    names = [example.name for example in found.examples]
+        gathered = save_example_folder(source, output, request=request, progress=progress)
+    example_set = gathered.examples
+    names = [example.name for example in example_set.examples]
     data = {
         "examples": str(output),
         "sheet": str(output / "examples.jpg"),
         "neutral": names[0],
-        "standard": names[found.standard],
-        "teeth": [names[index] for index in found.teeth],
+        "standard": names[example_set.standard],
+        "teeth": [names[index] for index in example_set.teeth],
         "chosen": gathered.why,
-        "statistics": len(found.statistics),
+        "statistics": len(example_set.statistics),
         "notes": list(gathered.notes),
     }
+    count = len(example_set.statistics)
     text = (
-        f"{output}: {len(names)} examples, point statistics of {len(found.statistics)} pictures\n"
-        f"  at rest: {names[0]}; mouth open: {names[found.standard]}\n"
+        f"{output}: {len(names)} examples, point statistics of {count} pictures\n"
+        f"  at rest: {names[0]}; mouth open: {names[example_set.standard]}\n"
         f"  look at {output / 'examples.jpg'}"
     )
     print_result(json_, data, text, gathered.notes)

@@ -6,10 +6,11 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from mien.progress import Progress, no_progress
+
 if TYPE_CHECKING:
     from rich.progress import Task
 
-    from mien.pipelines.build import Progress
 
 _COMPILING = "First run: compiling kernels on the way, once, some 15 s."
 _COMPILING_EVERY_TIME = (
@@ -30,7 +31,7 @@ def terminal_progress(quiet: bool, *, counted: Collection[str] = ()) -> Iterator
         a function of (stage, done, total); total 0 means "unknown, still at it".
     """
     if quiet:
-        yield lambda stage, done, total: None
+        yield no_progress
         return
     from rich.console import Console
     from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn

@@ -99,9 +99,9 @@ def synthesize(
     options = _options(paper, propagation, distance_penalty, slack, upper_face_as_one)
     view = {"--yaw": yaw, "--pitch": pitch, "--size": size, "--background": background}
     if is_head_folder(examples):
-        wrong = {"--head": None if head == "auto" else head, "--face": face}
-        _refuse(wrong | {"--save-points": save_points}, "a set of examples")
-        _of_head(examples, output, points, photo, weights, options, not paper, view, json_)
+        unused = {"--head": None if head == "auto" else head, "--face": face}
+        _refuse(unused | {"--save-points": save_points}, "a set of examples")
+        _synthesize_head(examples, output, points, photo, weights, options, not paper, view, json_)
         return
     _refuse(view, "a head folder")
     if photo is None:
@@ -109,7 +109,7 @@ def synthesize(
     elif points is None:
         _refuse({"--head": None if head == "auto" else head}, "--points")
     with terminal_progress(json_) as progress:
-        made = synthesize_expression(
+        result = synthesize_expression(
             examples,
             output,
             points=points,
@@ -121,19 +121,19 @@ def synthesize(
             face=face,
             progress=progress,
         )
-    height, width = made.synthesis.image.shape[:2]
+    height, width = result.synthesis.image.shape[:2]
     data = {
         "output": str(output),
         "width": width,
         "height": height,
         "weights": None if weights is None else str(weights),
-        "hull_px": {name: round(px, 3) for name, px in made.hull_px.items()},
-        "notes": list(made.notes),
+        "hull_px": {name: round(px, 3) for name, px in result.hull_px.items()},
+        "notes": list(result.notes),
     }
-    print_result(json_, data, f"{output}: {width}x{height}", made.notes)
+    print_result(json_, data, f"{output}: {width}x{height}", result.notes)
 
 
-def _of_head(
+def _synthesize_head(
     folder: Path,
     output: Path,
     points: Path | None,
@@ -144,13 +144,13 @@ def _of_head(
     view: dict[str, Any],
     json_: bool,
 ) -> None:
-    """The same of a head folder."""
+    """Synthesize and print an expression of a head."""
     from mien.pipelines.synthesize_head import synthesize_head
 
     if photo is not None:
         _refuse(view, "--points; a photo has its own")
     with terminal_progress(json_) as progress:
-        made = synthesize_head(
+        result = synthesize_head(
             folder,
             output,
             points=points,
@@ -161,16 +161,16 @@ def _of_head(
             view=_view(**{name.removeprefix("--"): value for name, value in view.items()}),
             progress=progress,
         )
-    width, height = made.size
+    width, height = result.size
     data = {
         "output": str(output),
         "width": width,
         "height": height,
         "weights": None if weights is None else str(weights),
-        "hull_mm": {name: round(mm, 3) for name, mm in made.hull_mm.items()},
-        "notes": list(made.notes),
+        "hull_mm": {name: round(mm, 3) for name, mm in result.hull_mm.items()},
+        "notes": list(result.notes),
     }
-    print_result(json_, data, f"{output}: {width}x{height}", made.notes)
+    print_result(json_, data, f"{output}: {width}x{height}", result.notes)
 
 
 def _view(
@@ -190,7 +190,11 @@ def _view(
 
 
 def _refuse(options: dict[str, Any], where: str) -> None:
-    """Raises: InputError: one that was given and means nothing here."""
+    """Refuse options that are given and apply elsewhere only.
+
+    Raises:
+        InputError: names the first.
+    """
     from mien.errors import InputError
 
     for name, value in options.items():
@@ -205,7 +209,7 @@ def _options(
     slack: float | None,
     upper_face_as_one: bool,
 ) -> SynthesisOptions:
-    """The paper's or the usual ones, and what was said otherwise."""
+    """The paper's options or the defaults, overridden by those that are given."""
     from dataclasses import replace
 
     from mien.synthesis.inference.coefficients import UPPER_FACE
@@ -217,5 +221,5 @@ def _options(
         "slack": slack,
         "tied": (UPPER_FACE,) if upper_face_as_one else None,
     }
-    usual = SynthesisOptions.paper() if paper else SynthesisOptions()
-    return replace(usual, **{name: value for name, value in given.items() if value is not None})
+    defaults = SynthesisOptions.paper() if paper else SynthesisOptions()
+    return replace(defaults, **{name: value for name, value in given.items() if value is not None})

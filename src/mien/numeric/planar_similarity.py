@@ -9,14 +9,14 @@ import numpy as np
 from mien.arrays import Array, Float, check_array
 from mien.errors import EstimationError, InputError
 
-__all__ = ["PlanarMotion", "estimate_planar_motion"]
+__all__ = ["PlanarSimilarity", "estimate_planar_similarity"]
 
 _LEAST_SPREAD = 1e-9
 """Points nearer to each other than this part of their coordinates are one place."""
 
 
 @dataclass(frozen=True)
-class PlanarMotion:
+class PlanarSimilarity:
     """(x, y) -> [[a, -b], [b, a]] (x, y) + (tx, ty), one or a batch of any shape.
 
     Attributes:
@@ -47,9 +47,9 @@ class PlanarMotion:
         return _turned(self.a / squared, -self.b / squared, points - self.translation[..., None, :])
 
 
-def estimate_planar_motion(
+def estimate_planar_similarity(
     source: Float[Array, "n 2"], target: Float[Array, "*batch n 2"]
-) -> PlanarMotion:
+) -> PlanarSimilarity:
     """The similarities in the plane that take source nearest to target by least squares.
 
     Args:
@@ -75,7 +75,7 @@ def estimate_planar_motion(
     a, b = (across @ x + down @ y) / spread, (down @ x - across @ y) / spread
     _check_spread("those that moved", (a * a + b * b) * spread, target)
     turned = _turned(a, b, source_mean[None])[..., 0, :]
-    return PlanarMotion(a, b, target_mean - turned)
+    return PlanarSimilarity(a, b, target_mean - turned)
 
 
 def _turned(a: Array, b: Array, points: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int
 
 
-class GroupSums:
+class SegmentSum:
     """Sums of values by group, prepared once for many calls.
 
     np.add.at does the same ten times slower.

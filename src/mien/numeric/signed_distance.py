@@ -8,7 +8,7 @@ from mien.arrays import Array, Bool, Float, Int
 from mien.numeric.kernels.jit import njit
 
 
-def depths_below(
+def penetration_depths(
     points: Float[Array, "n 3"],
     vertices: Float[Array, "v 3"],
     triangles: Int[Array, "f 3"],

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,14 +15,11 @@ from mien.arrays import Array, UInt8
 from mien.errors import FileFormatError, InputError
 from mien.head import NEUTRAL, Head
 from mien.io.files.atomic import check_file_place, check_files_apart
-from mien.io.timeline.timeline_check import check_timeline
-from mien.io.timeline.timeline_file import load_performance, performance_files
+from mien.io.timeline.timeline_file import check_timeline, load_timeline, timeline_files
 from mien.pipelines.explained import units_of
+from mien.progress import Progress, StepProgress, no_progress, stage_progress
 from mien.render.picture import GREY, HeadRenderer
 from mien.rig.state import FaceState
-
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
 
 SIZE = (720, 900)
 """Of pictures, px, unless the timeline or the user says."""
@@ -54,7 +50,7 @@ class _Job:
     yaw: float
     pitch: float
     background: tuple[int, int, int] | None
-    tell: Callable[[int, int], None] = field(repr=False)
+    tell: StepProgress = field(repr=False)
 
     @cached_property
     def times(self) -> Array:
@@ -90,12 +86,13 @@ def animate_head(
     read: Iterable[str | Path] = (),
     progress: Progress | None = None,
 ) -> Take:
-    """Let a head perform a timeline; frames are made one at a time, and a run that is stopped
+    """Let a head perform a timeline, into a video, pictures, a model or a table.
 
-    leaves what was there.
+    Frames are made one at a time; what was at the place stays until the new file is whole.
 
     Args:
-        timeline: or the file that holds one (io.timeline.timeline_file.load_performance).
+        head: the head.
+        timeline: or a file that holds one (mien.io.load_timeline).
         path: what to write, by its suffix: .mp4, .webm, .glb, .usdz, .csv (Live Link Face), .fap
             (MPEG-4); a name without one, or with a slash at its end, is a folder of pictures.
         fps: frames a second; the timeline's unless given.
@@ -104,7 +101,10 @@ def animate_head(
         pitch: radians, how the head is turned before it moves; for pictures.
         background: sRGB. Unless given, pictures and .webm have alpha and an .mp4 a plain grey.
         read: files and folders beside the timeline that must stay as they are, such as the head's.
-        progress: told the stage, the frames done and their total.
+        progress: called with the stage, frames done and their total.
+
+    Returns:
+        How many frames were written, and notes for the user.
 
     Raises:
         InputError: another suffix, a place that is read or cannot be written, a rate that a .fap
@@ -112,12 +112,12 @@ def animate_head(
         FileFormatError: the timeline; what in it the head cannot do, by place; more than
             MAX_FRAMES.
     """
-    files = [] if isinstance(timeline, Timeline) else performance_files(timeline)
+    files = [] if isinstance(timeline, Timeline) else timeline_files(timeline)
     write = _writer(path, [*files, *read])
     name = timeline if isinstance(timeline, (str, Path)) else "timeline"
-    played = timeline if isinstance(timeline, Timeline) else load_performance(timeline)
+    played = timeline if isinstance(timeline, Timeline) else load_timeline(timeline)
     check_timeline(played, expressions=head.expressions, units=head.unit_names, path=name)
-    tell = progress or (lambda stage, done, total: None)
+    tell = progress or no_progress
     job = _Job(
         renderer=HeadRenderer(head),
         timeline=played,
@@ -126,7 +126,7 @@ def animate_head(
         yaw=yaw,
         pitch=pitch,
         background=background,
-        tell=lambda done, total: tell(STAGE, done, total),
+        tell=stage_progress(tell, STAGE),
     )
     try:
         _ = job.times
@@ -188,44 +188,44 @@ def _writer(path: str | Path, read: Iterable[str | Path]) -> Callable[[_Job, str
 
 
 def _write_pictures(job: _Job, path: str | Path) -> int:
-    from mien.io.files.frames import write_frames
+    from mien.io.files.frames import save_frames
 
-    return write_frames(path, job.pictures(job.background))
+    return save_frames(path, job.pictures(job.background))
 
 
 def _write_video(job: _Job, path: str | Path) -> int:
-    from mien.io.files.video import write_video
+    from mien.io.files.video import save_video
 
     opaque = Path(path).suffix.lower() == ".mp4"
     background = job.background or (GREY if opaque else None)
-    return write_video(path, job.pictures(background), job.fps)
+    return save_video(path, job.pictures(background), job.fps)
 
 
 def _write_model(job: _Job, path: str | Path) -> int:
+    from mien.io.mesh.animation_baking import bake_animation
     from mien.io.mesh.export import export_head
-    from mien.io.timeline.performance import performance
 
-    animation = performance(job.renderer.head, job.moments(), job.renderer.rig.evaluate)
+    animation = bake_animation(job.renderer.head, job.moments(), job.renderer.rig.evaluate)
     export_head(job.renderer.head, path, animation=animation)
     return len(animation.times)
 
 
 def _write_live_link(job: _Job, path: str | Path) -> int:
-    from mien.io.live.live_link import write_live_link
+    from mien.io.live.live_link_csv import save_live_link
 
     head = job.renderer.head
-    return write_live_link(path, job.moments(), units_of=lambda state: units_of(head, state))
+    return save_live_link(path, job.moments(), units_of=lambda state: units_of(head, state))
 
 
 def _write_fap(job: _Job, path: str | Path) -> int:
-    from mien.io.timeline.fap import FapMeter, write_fap
+    from mien.io.timeline.fap import FapMeter, save_fap
 
     meter = FapMeter.of(job.renderer.head.mesh.vertices)
     values = (
         meter.read(job.renderer.rig.evaluate(moment.state).vertices, moment.rotation)
         for moment in job.moments()
     )
-    return write_fap(path, values, job.fps)
+    return save_fap(path, values, job.fps)
 
 
 _WRITERS: dict[str, Callable[[_Job, str | Path], int]] = {

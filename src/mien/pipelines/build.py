@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,8 +16,9 @@ from mien.capture.source import Capture, load_capture
 from mien.errors import EstimationError
 from mien.head import ATLAS, CYLINDER, NEUTRAL, Expression, FittedView, Head
 from mien.io.files.manifest import kept_notes
-from mien.io.files.video import write_video
+from mien.io.files.video import save_video
 from mien.io.head.head_folder import check_head_place, head_place, write_head
+from mien.progress import Progress, StepProgress, no_progress, stage_progress
 from mien.reconstruction.expression.fit import ExpressionFit, fit_expression
 from mien.reconstruction.expression.known_head import KnownHead
 from mien.reconstruction.fit import Fit, FitOptions, fit_views
@@ -33,9 +34,6 @@ from mien.texture.cylinder import cylinder_surface, fit_cylinder
 from mien.texture.extract import Texture, extract_texture
 from mien.texture.fill import Fill
 from mien.texture.surface import SurfaceMap
-
-Progress = Callable[[str, int, int], None]
-"""Told the stage, the steps done and their total."""
 
 SOLVING = "Solving cameras and shape"
 REPORTING = "Writing the report"
@@ -103,15 +101,24 @@ def build_head(
     options: BuildOptions | None = None,
     progress: Progress | None = None,
 ) -> Build:
-    """A textured head from a folder of photos, one photo, or a video.
+    """A textured head from a folder of photos, one photo or a video of a person.
+
+    Args:
+        source: photos of the face at rest; or a folder with a folder of photos for each expression,
+            one of them called "neutral"; or a video.
+        options: how; the defaults unless given.
+        progress: called with the stage, steps done and their total.
+
+    Returns:
+        The head (`Build.head`), what it was made from, and notes for the user.
 
     Raises:
-        InputError: the source.
-        FileFormatError: the source.
+        InputError: nothing at `source` that can be read, or no photo in it.
+        FileFormatError: a photo, a video or an annotation file is damaged.
         EstimationError: no photo fits.
     """
     options = options or BuildOptions()
-    tell = progress or (lambda stage, done, total: None)
+    tell = progress or no_progress
     _check_neutral(Path(source))
     generic = load_generic_head()
     capture = load_capture(
@@ -119,7 +126,7 @@ def build_head(
         face=options.face,
         frames=options.frames,
         expressions=options.expressions,
-        progress=lambda done, total: tell("Finding faces", done, total),
+        progress=stage_progress(tell, "Finding faces"),
     )
     capture = _named_by_expression(capture)
     if NEUTRAL not in capture.expressions:
@@ -147,7 +154,7 @@ def _fit_all(
     """
     count = len(capture.expressions)
 
-    def part(number: int) -> Callable[[int, int], None]:
+    def part(number: int) -> StepProgress:
         return lambda done, total: tell(SOLVING, number * total + done, count * total)
 
     tell(SOLVING, 0, count)
@@ -299,11 +306,17 @@ def build_head_folder(
 ) -> Build:
     """As build_head, and written as a head folder with its report and a turntable video.
 
+    Args:
+        source: as for build_head.
+        folder: to write; a head folder that is there is replaced.
+        options: as for build_head.
+        progress: as for build_head.
+
     Raises:
         as build_head; InputError: the place holds something that is no head folder, or cannot be
             written. Whatever was there stays until the new folder is whole.
     """
-    tell = progress or (lambda stage, done, total: None)
+    tell = progress or no_progress
     check_head_place(folder, read=[source])
     result = build_head(source, options=options, progress=progress)
     stage = "Writing the head"
@@ -317,11 +330,11 @@ def build_head_folder(
                 file = (place / "annotations" / view.photo.name).with_suffix(".json")
                 save_annotations(file, view.photo, view.annotations)
         tell(stage, 1, 2)
-        write_video(place / TURNTABLE, turntable_frames(result.head), fps=24)
+        save_video(place / TURNTABLE, turntable_frames(result.head), fps=24)
         tell(stage, 2, 2)
         report = ReportInput(
             result.head, photos, result.fits, result.coverage, result.notes, TURNTABLE
         )
-        page = render_report(report, progress=lambda done, total: tell(REPORTING, done, total))
+        page = render_report(report, progress=stage_progress(tell, REPORTING))
         (place / "report.html").write_text(page, encoding="utf-8")
     return replace(result, kept=kept_notes(Path(folder)))

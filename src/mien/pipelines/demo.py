@@ -15,12 +15,13 @@ from mien.io.files.image import save_image
 from mien.io.head.head_folder import is_head_folder
 from mien.io.mesh.export import export_head
 from mien.pipelines.animate import animate_head
-from mien.pipelines.build import TURNTABLE, Progress, build_head_folder
+from mien.pipelines.build import TURNTABLE, build_head_folder
+from mien.progress import Progress
 from mien.render.picture import GREY, HeadRenderer, render_head
 from mien.rig.state import FaceState
 
 
-class _Look(TypedDict):
+class _RenderOptions(TypedDict):
     size: tuple[int, int]
     background: tuple[int, int, int]
 
@@ -37,7 +38,7 @@ UNITS = {
     "blink": {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0},
     "brows up": {"browInnerUp": 1.0, "browOuterUpLeft": 0.8, "browOuterUpRight": 0.8},
 }
-_LOOK = _Look(size=(480, 600), background=GREY)
+_RENDER_OPTIONS = _RenderOptions(size=(480, 600), background=GREY)
 PERFORMANCE = "performance.mp4"
 _FPS = 25
 _STAGE = "Rendering and exporting"
@@ -49,33 +50,50 @@ def demo_photos() -> Path:
 
 
 def run_demo(folder: Path, *, progress: Progress) -> Path:
-    """Head, pictures, `.glb`, a performance and a page that shows them. Returns the page.
+    """Head, pictures, `.glb`, a performance and a page that shows them.
+
+    Args:
+        folder: to write.
+        progress: called with the stage, steps done and their total.
+
+    Returns:
+        the page.
 
     Raises:
         InputError: the folder holds something else or cannot be written.
     """
     check_folder_place(folder, replaces=_is_demo)
-    with atomic_folder(folder, replaces=_is_demo, stay=()) as place:
-        head = build_head_folder(demo_photos(), place / "head", progress=progress).head
-        pictures = _save_pictures(head, place, progress)
-        export_head(head, place / "james.glb")
+    with atomic_folder(folder, replaces=_is_demo, editable=()) as temporary:
+        head = build_head_folder(demo_photos(), temporary / "head", progress=progress).head
+        pictures = _save_pictures(head, temporary, progress)
+        export_head(head, temporary / "james.glb")
         progress(_STAGE, 2, 2)
         animate_head(
-            head, SAMPLE_TIMELINE, place / PERFORMANCE, fps=_FPS, **_LOOK, progress=progress
+            head,
+            SAMPLE_TIMELINE,
+            temporary / PERFORMANCE,
+            fps=_FPS,
+            **_RENDER_OPTIONS,
+            progress=progress,
         )
-        shutil.copy(SAMPLE_TIMELINE, place)
+        shutil.copy(SAMPLE_TIMELINE, temporary)
         page = _page(head, pictures)
-        (place / "index.html").write_text(page, encoding="utf-8")
+        (temporary / "index.html").write_text(page, encoding="utf-8")
     return folder / "index.html"
 
 
-def _save_pictures(head: Head, place: Path, progress: Progress) -> dict[str, list[dict[str, str]]]:
-    """Pictures of the head, turned and with face units: captions and file names by section."""
+def _save_pictures(head: Head, folder: Path, progress: Progress) -> dict[str, list[dict[str, str]]]:
+    """Save pictures of the head, turned and with face units; captions and file names by section."""
     progress(_STAGE, 0, 2)
     renderer = HeadRenderer(head)
-    turned = {name: render_head(renderer, yaw=radians(yaw), **_LOOK) for name, yaw in YAWS.items()}
+    turned = {
+        name: render_head(renderer, yaw=radians(yaw), **_RENDER_OPTIONS)
+        for name, yaw in YAWS.items()
+    }
     moved = {
-        name: render_head(renderer, yaw=radians(-20), state=FaceState(units=units), **_LOOK)
+        name: render_head(
+            renderer, yaw=radians(-20), state=FaceState(units=units), **_RENDER_OPTIONS
+        )
         for name, units in UNITS.items()
     }
     shown: dict[str, list[dict[str, str]]] = {}
@@ -83,7 +101,7 @@ def _save_pictures(head: Head, place: Path, progress: Progress) -> dict[str, lis
         shown[section] = []
         for name, picture in pictures.items():
             file = f"pictures/{name.replace(' ', '_')}.jpg"
-            save_image(place / file, picture, quality=90)
+            save_image(folder / file, picture, quality=90)
             shown[section].append({"file": file, "caption": name})
     progress(_STAGE, 1, 2)
     return shown

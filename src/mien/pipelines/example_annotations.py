@@ -1,4 +1,4 @@
-"""Points that a person marked by hand on the photos that become examples."""
+"""Points annotated by hand on the photos that become examples."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mien.capture.annotations import AnnotationNames, load_annotations
 from mien.capture.folder import ANNOTATIONS
 from mien.capture.images.photos import Photo
 from mien.errors import OtherPointsError
-from mien.io.landmarks.points_file import read_points
+from mien.io.landmarks.points_file import load_feature_points
 from mien.reading.strict_json import read_json
 
 __all__ = [
@@ -23,50 +23,63 @@ __all__ = [
     "annotation_notes",
     "apply_all_annotations",
     "apply_annotations",
-    "read_annotated_points",
+    "load_annotated_points",
 ]
 
-OF_HEADS = tuple(
+HEAD_POINTS = tuple(
     [f"{side}_{part}" for side in ("right", "left") for part in ("eye_outer", "eye_inner")]
     + ["right_mouth_corner", "left_mouth_corner", "nose_tip"]
 )
-"""What marks made for `mien build` share with the feature points; their polylines do not."""
+"""The feature points among the annotations for `mien build`; their polylines hold none."""
 
-REACH = 0.12
-"""Points this near to a marked one, in widths of the face, follow it by 0.6 of its way."""
+NEIGHBOUR_SCALE = 0.12
+"""Standard deviation, in widths of the face, of the Gaussian weights by which the neighbours of an
+annotated point follow it."""
 
-Marks = Mapping[str, Float[Array, " 2"]]
+AnnotatedPoints = Mapping[str, Float[Array, " 2"]]
+"""px, by name."""
 
 
-def read_annotated_points(
+def load_annotated_points(
     file: Path, photo: Photo, layout: FeatureLayout
 ) -> dict[str, Float[Array, " 2"]]:
-    """Hand-made marks beside a photo, by point, in px of the photo as loaded.
+    """Hand-annotated points beside a photo, by name, in px of the photo as loaded.
 
     Looked for in `STEM.tem` and `STEM.pts` beside it and in `annotations/STEM.json`, either
-    `{"layout": ..., "points": ...}` or marks as `mien build` uses them; where two of these mark
-    the same point, the later one counts. All are in px of the photo's file, turned upright. A file
-    of points that mien does not know is left out; `annotation_notes` tells.
+    `{"layout": ..., "points": ...}` or annotations as `mien build` uses them; where two of these
+    have the same point, the later one counts. All are in px of the photo's file, turned upright. A
+    file of points that mien does not know is left out; `annotation_notes` says so.
+
+    Args:
+        file: the photo's.
+        photo: as loaded.
+        layout: of the points.
 
     Raises:
         FileFormatError: one of them is damaged; says where.
     """
-    sources = annotation_files(file)
-    for_heads = [path for path in sources if _is_for_heads(path)]
-    found: dict[str, Array] = {}
-    for path in (path for path in sources if path not in for_heads):
+    paths = annotation_files(file)
+    for_heads = [path for path in paths if _is_for_heads(path)]
+    annotated: dict[str, Array] = {}
+    for path in (path for path in paths if path not in for_heads):
         with suppress(OtherPointsError):
-            rows, places = read_points(path, layout)
-            found |= {layout.names[r]: at * photo.scale for r, at in zip(rows, places, strict=True)}
+            rows, points = load_feature_points(path, layout)
+            named = zip(rows, points, strict=True)
+            annotated |= {layout.names[row]: point * photo.scale for row, point in named}
     for path in for_heads:
         names = AnnotationNames.of(load_generic_head())
-        points = load_annotations(path, photo, names=names).points
-        found |= {n: points[n] for n in OF_HEADS if n in points and n in layout.names}
-    return found
+        of_head = load_annotations(path, photo, names=names).points
+        known = [name for name in HEAD_POINTS if name in of_head and name in layout.names]
+        annotated |= {name: of_head[name] for name in known}
+    return annotated
 
 
 def annotation_notes(file: Path, layout: FeatureLayout) -> list[str]:
     """Which files beside a photo hold points that mien does not know.
+
+    Args:
+        file: the photo's.
+        layout: of the points.
 
     Raises:
         FileFormatError: one of them is damaged.
@@ -75,17 +88,21 @@ def annotation_notes(file: Path, layout: FeatureLayout) -> list[str]:
     for path in annotation_files(file):
         try:
             if not _is_for_heads(path):
-                read_points(path, layout)
+                load_feature_points(path, layout)
         except OtherPointsError as error:
             notes.append(f"{path.name} is not used: {error.problem}")
     return notes
 
 
 def annotation_files(file: Path) -> list[Path]:
-    """Where a photo's marks are, those that count most last."""
+    """Files with annotations of a photo, by rising precedence.
+
+    Args:
+        file: the photo's.
+    """
     annotations = file.parent / ANNOTATIONS / f"{file.stem}.json"
-    places = (file.with_suffix(".tem"), file.with_suffix(".pts"), annotations)
-    return [path for path in places if path.is_file()]
+    paths = (file.with_suffix(".tem"), file.with_suffix(".pts"), annotations)
+    return [path for path in paths if path.is_file()]
 
 
 def _is_for_heads(path: Path) -> bool:
@@ -93,26 +110,38 @@ def _is_for_heads(path: Path) -> bool:
 
 
 def apply_annotations(
-    layout: FeatureLayout, points: Float[Array, "n 2"], marks: Marks
+    layout: FeatureLayout, points: Float[Array, "n 2"], annotated: AnnotatedPoints
 ) -> Float[Array, "n 2"]:
-    """Detected points with marked ones in their places; neighbours follow, less the farther."""
-    if not marks:
+    """Detected points with annotated ones in their places; their neighbours follow in part.
+
+    Args:
+        layout: of the points.
+        points: (n, 2) px, detected.
+        annotated: px, by name.
+    """
+    if not annotated:
         return points
-    rows = [layout.index(name) for name in marks]
-    moved = np.stack(list(marks.values())) - points[rows]
-    reach = REACH * float(np.ptp(points[:, 0]))
-    apart = np.linalg.norm(points[:, None] - points[rows], axis=2) / reach
-    pull = np.exp(-(apart**2) / 2)
-    result: Array = points + pull @ moved / np.maximum(pull.sum(axis=1), 1)[:, None]
-    result[rows] = points[rows] + moved
+    rows = [layout.index(name) for name in annotated]
+    offsets = np.stack(list(annotated.values())) - points[rows]
+    scale = NEIGHBOUR_SCALE * float(np.ptp(points[:, 0]))
+    distances = np.linalg.norm(points[:, None] - points[rows], axis=2) / scale
+    weights = np.exp(-(distances**2) / 2)
+    result: Array = points + weights @ offsets / np.maximum(weights.sum(axis=1), 1)[:, None]
+    result[rows] = points[rows] + offsets
     return result
 
 
 def apply_all_annotations(
-    layout: FeatureLayout, points: Float[Array, "N n 2"], marks: Mapping[int, Marks]
+    layout: FeatureLayout, points: Float[Array, "N n 2"], annotated: Mapping[int, AnnotatedPoints]
 ) -> Float[Array, "N n 2"]:
-    """Detected points of all pictures; marks, by row, win."""
+    """Detected points of all pictures with annotated ones in their places.
+
+    Args:
+        layout: of the points.
+        points: (N, n, 2) px, detected.
+        annotated: px, by row and name.
+    """
     result: Array = points.copy()
-    for row, found in marks.items():
-        result[row] = apply_annotations(layout, points[row], found)
+    for row, own in annotated.items():
+        result[row] = apply_annotations(layout, points[row], own)
     return result

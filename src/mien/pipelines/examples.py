@@ -5,11 +5,10 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.faces.face_series import FaceSeries, find_faces, load_pictures, row_of, rows_of
 from mien.capture.images.photos import Photo, load_photo
 from mien.capture.notes import gathered_notes
-from mien.capture.source_kind import kind_of_source
+from mien.capture.source_kind import SourceKind, kind_of_source
 from mien.io.examples.example_folder import (
     check_example_place,
     is_example_folder,
@@ -29,14 +28,15 @@ from mien.io.files.atomic import atomic_folder
 from mien.io.files.image import encode_image
 from mien.io.files.manifest import kept_notes
 from mien.pipelines.example_annotations import (
-    Marks,
+    AnnotatedPoints,
     annotation_files,
     annotation_notes,
     apply_all_annotations,
     apply_annotations,
-    read_annotated_points,
+    load_annotated_points,
 )
-from mien.reading.names import plain_name
+from mien.progress import Progress, StepProgress, no_progress
+from mien.reading.names import portable_name
 from mien.report.example_sheet import example_sheet
 from mien.synthesis.examples.brow_correction import detected_points
 from mien.synthesis.examples.example_plan import (
@@ -51,28 +51,25 @@ from mien.synthesis.examples.mouth_occlusion import LipContrast
 from mien.synthesis.examples.quality_filter import CUT, OCCLUDED, rejection_reasons
 from mien.synthesis.examples.selection import COUNT
 
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
-
 FINDING, FETCHING = "Finding the face", "Fetching the examples"
-LOOKING, WRITING = "Looking at them again", "Writing"
+DETECTING_AGAIN, WRITING = "Looking at them again", "Writing"
 COUNTED = (FINDING,)
 """Stages whose steps are pictures."""
-MAX_SIDE = 1200
+EXAMPLE_SIDE = 1200
 """px; larger photos are reduced to it: a face needs no more than some 600 px for its wrinkles."""
 
 
 @dataclass(frozen=True)
 class ExampleRequest:
-    """What the user says of the choice; pictures by frame number or file name.
+    """The user's options; pictures by frame number or file name.
 
     Attributes:
         count: of examples at most.
-        neutral: which picture is that; None: found.
-        standard: which picture is that; None: found.
-        include: pictures that are, and are not, to be examples; of a video, stretches of frames as
-            well, as `860-930`.
-        exclude: as `include`.
+        neutral: the picture of the face at rest; None: found.
+        standard: the picture in which subregions are drawn; None: found.
+        include: pictures that are examples in any case; of a video, stretches of frames as well,
+            as `860-930`.
+        exclude: likewise, pictures that are not used.
         face: which one, from left to right, in photos of several people.
         max_side: px; larger pictures are reduced to it.
         even: bring photos to one exposure.
@@ -84,11 +81,15 @@ class ExampleRequest:
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     face: int | None = None
-    max_side: int = MAX_SIDE
+    max_side: int = EXAMPLE_SIDE
     even: bool = True
 
-    def wishes(self, series: FaceSeries) -> SelectionOverrides:
-        """The same by the rows of a series. Raises: InputError: names what is not there."""
+    def overrides(self, series: FaceSeries) -> SelectionOverrides:
+        """The same by the rows of a series.
+
+        Raises:
+            InputError: names what is not there.
+        """
         return SelectionOverrides(
             None if self.neutral is None else row_of(series, self.neutral, "--neutral"),
             None if self.standard is None else row_of(series, self.standard, "--standard"),
@@ -103,7 +104,7 @@ def _all_rows(series: FaceSeries, names: Sequence[str], option: str) -> tuple[in
 
 @dataclass(frozen=True)
 class GatheredExamples:
-    """What came of a source.
+    """The examples of a source.
 
     Attributes:
         examples: in the order in which they were chosen, neutral first.
@@ -118,7 +119,7 @@ class GatheredExamples:
     notes: tuple[str, ...]
 
 
-def write_example_folder(
+def save_example_folder(
     source: str | Path,
     folder: str | Path,
     *,
@@ -127,23 +128,29 @@ def write_example_folder(
 ) -> GatheredExamples:
     """Examples of a person, in a folder, whole or not at all.
 
+    Args:
+        source: as for `gather_examples`.
+        folder: to write; one that holds examples is replaced.
+        request: as for `gather_examples`.
+        progress: as for `gather_examples`.
+
     Raises:
         InputError: before anything is written; as `gather_examples`, a source that mien made, and a
             place that holds something else.
         FileFormatError: as InputError.
         EstimationError: as InputError.
     """
-    tell = progress or (lambda stage, done, total: None)
-    kind_of_source(source)
+    report = progress or no_progress
+    kind = kind_of_source(source)
     check_example_place(folder, read=[source])
-    gathered = gather_examples(source, request=request, progress=tell)
-    tell(WRITING, 0, 0)
-    with atomic_folder(folder, replaces=is_example_folder, read=[source], stay=()) as temporary:
+    gathered = _gather(source, kind, request, None, report)
+    report(WRITING, 0, 0)
+    with atomic_folder(folder, replaces=is_example_folder, read=[source], editable=()) as temporary:
         write_example_files(temporary, gathered.examples, why=gathered.why)
         sheet = example_sheet(gathered.examples, gathered.why)
         (temporary / "examples.jpg").write_bytes(encode_image(sheet, "JPEG", quality=92))
         (temporary / "choice.csv").write_text(_choice_csv(gathered.pictures), encoding="utf-8")
-    tell(WRITING, 1, 1)
+    report(WRITING, 1, 1)
     return replace(gathered, notes=(*gathered.notes, *kept_notes(Path(folder))))
 
 
@@ -157,66 +164,63 @@ def gather_examples(
     """Examples of the person in a video or in a folder of photos.
 
     Args:
+        source: the video or the folder.
+        request: the user's options.
         layout: of the points; mien's own unless given.
-        progress: told the stage, steps done and their total.
+        progress: called with the stage, steps done and their total.
 
     Raises:
         InputError: no such source, a picture asked for that is not there.
-        FileFormatError: a damaged photo, video or file of marks.
+        FileFormatError: a damaged photo, video or file of annotations.
         EstimationError: no picture shows a face.
     """
+    report = progress or no_progress
+    return _gather(source, kind_of_source(source), request, layout, report)
+
+
+def _gather(
+    source: str | Path,
+    kind: SourceKind,
+    request: ExampleRequest | None,
+    layout: FeatureLayout | None,
+    report: Progress,
+) -> GatheredExamples:
     request, layout = request or ExampleRequest(), layout or load_feature_layout()
-    tell = progress or (lambda stage, done, total: None)
-    looked = _Looked(layout)
+    measured = _Measurements(layout)
     with LandmarkDetector() as detector:
         series = find_faces(
             source,
             detector,
             max_side=request.max_side,
+            kind=kind,
             face=request.face,
-            look=looked,
-            report=partial(tell, FINDING),
+            look=measured,
+            report=partial(report, FINDING),
         )
-    wishes = request.wishes(series)
-    marks = _marks(series, layout)
-    points = apply_all_annotations(layout, np.stack(looked.points), marks)
-    unfit = rejection_reasons(points, series.sizes, looked.lips.covered(series.seconds))
-    plan = plan_examples(layout, series, points, wishes=wishes, unfit=unfit, count=request.count)
-    rows = plan.choice.rows.tolist()
-    photos = dict(load_pictures(series, rows, partial(tell, FETCHING)))
-    plan = plan.with_points(_steady(series, layout, photos, marks, partial(tell, LOOKING)))
-    video = plain_name(series.source) if series.is_video else ""
-    examples, why = build_examples(plan, photos, source=video, even=request.even)
+    overrides = request.overrides(series)
+    annotated = _annotated_points(series, layout)
+    points = apply_all_annotations(layout, np.stack(measured.points), annotated)
+    plan = plan_examples(
+        layout,
+        series,
+        points,
+        overrides=overrides,
+        rejections=rejection_reasons(points, series.sizes, measured.lips.occluded(series.seconds)),
+        count=request.count,
+    )
+    photos = dict(load_pictures(series, plan.choice.rows.tolist(), partial(report, FETCHING)))
+    plan = plan.with_points(
+        _averaged(series, layout, photos, annotated, partial(report, DETECTING_AGAIN))
+    )
+    video = portable_name(series.source) if series.is_video else ""
+    examples, why = build_examples(plan, photos, source=video, equalize=request.even)
     pictures = dict(zip(plan.names, plan.choice.reasons, strict=True)) | series.left_out
-    unused = [note for file in series.files for note in annotation_notes(file, layout)]
-    notes = [
-        *series.notes,
-        *unused,
-        *_notes(plan, series, marks),
-        *_set_notes(examples, photos, rows),
-    ]
-    return GatheredExamples(examples, why, tuple(sorted(pictures.items())), tuple(notes))
+    notes = _notes(series, layout, plan, annotated, photos, examples)
+    return GatheredExamples(examples, why, tuple(sorted(pictures.items())), notes)
 
 
-def _steady(
-    series: FaceSeries,
-    layout: FeatureLayout,
-    photos: Mapping[int, Photo],
-    marks: Mapping[int, Marks],
-    report: Callable[[int, int], None],
-) -> dict[int, Float[Array, "n 2"]]:
-    """The examples' points from several looks at each, by row; marks win."""
-    found = {}
-    with LandmarkDetector() as detector:
-        for number, (row, photo) in enumerate(photos.items()):
-            points = averaged_points(layout, detector, photo.pixels, series.landmarks[row])
-            found[row] = apply_annotations(layout, points, marks.get(row, {}))
-            report(number + 1, len(photos))
-    return found
-
-
-class _Looked:
-    """What is taken from each picture as long as its pixels are there."""
+class _Measurements:
+    """Taken from each picture while its pixels are in memory."""
 
     def __init__(self, layout: FeatureLayout) -> None:
         self.lips = LipContrast(layout)
@@ -228,40 +232,61 @@ class _Looked:
         self.points.append(detected_points(self._layout, pixels, landmarks))
 
 
-def _marks(series: FaceSeries, layout: FeatureLayout) -> dict[int, Marks]:
-    """Hand-made marks, by row, where there are any."""
-    found: dict[int, Marks] = {}
+def _annotated_points(series: FaceSeries, layout: FeatureLayout) -> dict[int, AnnotatedPoints]:
+    """Hand-made annotations, by row, where there are any."""
+    annotated: dict[int, AnnotatedPoints] = {}
     for row, file in enumerate(series.files):
         if annotation_files(file):
-            found[row] = read_annotated_points(
-                file, load_photo(file, max_side=series.max_side), layout
-            )
-    return {row: marks for row, marks in found.items() if marks}
+            photo = load_photo(file, max_side=series.max_side)
+            annotated[row] = load_annotated_points(file, photo, layout)
+    return {row: points for row, points in annotated.items() if points}
 
 
-def _notes(plan: ExamplePlan, series: FaceSeries, marks: dict[int, Marks]) -> list[str]:
-    """How many pictures were what, and what is missing."""
-    notes = gathered_notes(
-        (series.names[row], f"{len(found)} points marked by hand") for row, found in marks.items()
+def _averaged(
+    series: FaceSeries,
+    layout: FeatureLayout,
+    photos: Mapping[int, Photo],
+    annotated: Mapping[int, AnnotatedPoints],
+    report: StepProgress,
+) -> dict[int, Float[Array, "n 2"]]:
+    """The examples' points averaged over several detections, by row; annotated ones stay."""
+    averaged = {}
+    with LandmarkDetector() as detector:
+        for number, (row, photo) in enumerate(photos.items()):
+            points = averaged_points(layout, detector, photo.pixels, series.landmarks[row])
+            averaged[row] = apply_annotations(layout, points, annotated.get(row, {}))
+            report(number + 1, len(photos))
+    return averaged
+
+
+def _notes(
+    series: FaceSeries,
+    layout: FeatureLayout,
+    plan: ExamplePlan,
+    annotated: Mapping[int, AnnotatedPoints],
+    photos: Mapping[int, Photo],
+    examples: ExampleSet,
+) -> tuple[str, ...]:
+    """What was odd in the pictures, how many were what, and what was changed or is missing."""
+    notes = [*series.notes]
+    notes += [note for file in series.files for note in annotation_notes(file, layout)]
+    notes += gathered_notes(
+        (series.names[row], f"{len(points)} points marked by hand")
+        for row, points in annotated.items()
     )
     counts = Counter(_kind(reason) for reason in plan.choice.reasons)
     counts[NO_FACE] = len(series.left_out)
-    kinds = ("chosen", *KINDS.values(), NO_FACE)
-    told = [f"{counts[kind]} {kind}" for kind in kinds if counts[kind]]
-    notes.append(f"of {len(series) + len(series.left_out)} pictures {', '.join(told)}")
-    return notes
-
-
-def _set_notes(examples: ExampleSet, photos: Mapping[int, Photo], rows: Sequence[int]) -> list[str]:
-    """What was done to the examples' photos, and what they cannot do."""
-    pairs = zip(examples.examples, rows, strict=True)
+    kinds = [
+        f"{counts[kind]} {kind}" for kind in ("chosen", *KINDS.values(), NO_FACE) if counts[kind]
+    ]
+    notes.append(f"of {len(series) + len(series.left_out)} pictures {', '.join(kinds)}")
+    pairs = list(zip(examples.examples, plan.choice.rows.tolist(), strict=True))
     changed = sum(example.photo is not photos[row].pixels for example, row in pairs)
-    notes = []
     if changed:
         notes.append(f"exposure of {changed} examples brought to that of the face at rest")
-    if len(rows) == 1:
+    if len(pairs) == 1:
         notes.append("one example alone shows no expression but its own")
-    return notes
+    return tuple(notes)
 
 
 NO_FACE = "without a usable face"
@@ -275,7 +300,7 @@ KINDS = {
     "small": "small",
     "excluded": "excluded",
 }
-"""What pictures that are not chosen are called, by how their reasons begin."""
+"""Kinds of pictures that are not chosen, by the beginning of their reasons."""
 
 
 def _kind(reason: str) -> str:

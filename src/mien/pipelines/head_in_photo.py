@@ -1,4 +1,4 @@
-"""A known head found in one photo: where it is, and what its face does."""
+"""A known head found in one photo: its pose and expression."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _SIDE = 1280
 
 @dataclass(frozen=True)
 class HeadInPhoto:
-    """A head and its face in a photo.
+    """The expression of a head in a photo.
 
     Attributes:
         points: (n, 3) mm, head space, the feature points of the face.
@@ -46,10 +46,14 @@ class HeadInPhoto:
 
 
 def find_head(head: Head, photo: Photo) -> HeadInPhoto:
-    """The face of a photo that looks like the head's, as the head makes it; some seconds.
+    """Pose and expression of a head, fitted to the face in a photo; takes some seconds.
 
-    It is fitted to the photo's pixels, as in the frames of a video. Where none looks like them
-    then, head and face are taken from the landmarks of the largest alone.
+    They are fitted to the photo's pixels, as in the frames of a video. Where the result does not
+    look like the photo, they come from the landmarks of the largest face alone.
+
+    Args:
+        head: of the person.
+        photo: one face in it is the person's.
 
     Raises:
         EstimationError: no face, one too small, none that the head fits.
@@ -59,23 +63,23 @@ def find_head(head: Head, photo: Photo) -> HeadInPhoto:
     focal = photo.focal_prior_px or expected_focal(head, width, height).focal_px
     pixels = np.ascontiguousarray(shrunk(photo.pixels, _SIDE))
     with LandmarkDetector() as detector:
-        largest = detector.detect(photo)  # Says what is wrong before the head is made ready.
+        largest = detector.detect(photo)  # Fails before the slow preparation of the head.
         ready = ReadyHead(head, detector, TrackOptions())
-        # The tracker sees upright faces only.
+        # The tracker finds upright faces only.
         start = ready.starter.fit(largest.as_face(), size=photo.size, focal_px=focal)
         tracked = [
-            ready.tracker(width, height, focal).step(pixels, 0, 0.0, where)
-            for where in (None, start)
+            ready.tracker(width, height, focal).step(pixels, 0, 0.0, initial)
+            for initial in (None, start)
         ]
-    own = min(tracked, key=lambda frame: np.nan_to_num(frame.rms, nan=np.inf))
-    like = own.state is not None and own.rms <= STRANGE_RMS
-    state = own.state if like else start and start.state
+    best = min(tracked, key=lambda frame: np.nan_to_num(frame.rms, nan=np.inf))
+    like = best.state is not None and best.rms <= STRANGE_RMS
+    state = best.state if like else start and start.state
     if state is None:
         raise EstimationError(f"{photo.name}: no face found that fits the head")
     face = ready.model.rig.evaluate(state.face(ready.model.layout))
     camera = Camera(width, height, focal, state.R_cam_head, state.t_cam_head)
-    places = camera.project(load_generic_head().landmark_positions(face.vertices))
-    notes = [f"{photo.name}: {note}" for note in cut_note(places, photo.size)]
+    landmarks = camera.project(load_generic_head().landmark_positions(face.vertices))
+    notes = [f"{photo.name}: {note}" for note in cut_note(landmarks, photo.size)]
     if not like:
         notes.append(f"{photo.name}: {UNLIKE}; its points come from landmarks alone")
     return HeadInPhoto(feature_points_on(face.vertices), camera, ready.model.rig, tuple(notes))

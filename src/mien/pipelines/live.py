@@ -12,7 +12,7 @@ from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.video.live_source import LiveSource
 from mien.capture.video.video import Video
 from mien.head import Head
-from mien.pipelines.track import MAX_SIDE
+from mien.pipelines.track import TRACKING_SIDE
 from mien.pipelines.tracking.live_tracker import LiveStatus, LiveSummary, run_live
 from mien.pipelines.tracking.notes import check_found, track_notes
 from mien.pipelines.tracking.outputs import TrackFiles
@@ -62,7 +62,7 @@ def track_live_video(
     with LandmarkDetector() as detector:
         take = _Take(ReadyHead(head, detector, options or TrackOptions()), lens, calm)
         summary = run_live(
-            source, head, take.begun, streams, seconds=seconds, max_side=MAX_SIDE, tell=tell
+            source, head, take.begun, streams, seconds=seconds, max_side=TRACKING_SIDE, tell=tell
         )
     track, others = take.track(), take.met_others
     notes = [*summary.notes, *track_notes(track, head, met_others=others)]

@@ -4,32 +4,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mien.io.examples.example_folder import load_examples
-from mien.io.examples.weights_json import write_weights
+from mien.io.examples.weights_json import save_weights
 from mien.io.files.image import save_image
-from mien.io.landmarks.points_file import check_points_kind, write_points
+from mien.io.landmarks.points_file import check_points_kind, save_feature_points
 from mien.pipelines.synthesize_target import (
     HeadChoice,
-    Target,
+    SynthesisTarget,
     check_request,
     target_from_photo,
     target_from_points,
 )
+from mien.progress import Progress, no_progress
 from mien.synthesis.examples.example_set import ExampleSet
 from mien.synthesis.inference.input_checks import face_width
 from mien.synthesis.synthesizer import Synthesis, SynthesisOptions, Synthesizer
-
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
 
 __all__ = ["HULL_TOLERANCE", "SynthesizedPicture", "hull_note", "synthesize_expression"]
 
 READING, FINDING, DRAWING = "Reading the examples", "Finding the face", "Drawing"
 
 HULL_TOLERANCE = 0.01
-"""Face widths by which a subregion may leave what its examples reach before it is told of.
+"""Face widths by which a subregion may leave the hull of the examples without a note.
 
 Of held-out frames of two clips, 40 examples each, 5 in 100 subregions leave it so far, in a fifth
 of the frames; their PSNR is 1 to 2 dB below the same subregion's usual one, and from
@@ -39,10 +36,10 @@ of the frames; their PSNR is 1 to 2 dB below the same subregion's usual one, and
 
 @dataclass(frozen=True)
 class SynthesizedPicture:
-    """What came of it.
+    """An expression that was drawn.
 
     Attributes:
-        synthesis: the picture and its shares.
+        synthesis: the picture and its coefficients.
         hull_px: of each subregion, as `Synthesis.hull_px`.
         notes: what the user should know.
     """
@@ -68,65 +65,72 @@ def synthesize_expression(
     """Draw an expression of the person in an example folder and write the picture.
 
     Args:
+        folder: of the examples.
         output: .png or .jpg.
         points: a file of feature points, px of the neutral photo; or
-        photo: whose face has the expression; the picture gets its size, and the head its place.
-        weights: W.json, which examples made which subregion.
-        save_points: .json, .tem or .pts: where all points are, px of the picture.
+        photo: a file of one whose face has the expression; the picture gets its size, and the head
+            its position.
+        weights: W.json to write, which examples made which subregion.
+        save_points: .json, .tem or .pts to write, all points of the picture, px.
+        options: as for `Synthesizer`.
         head: of `points`, as for `target_from_points`.
         face: of `photo`, which one; the largest unless given.
-        progress: told the stage, steps done and their total.
+        progress: called with the stage, steps done and their total.
 
     Raises:
         InputError: neither or both of points and photo, a place that cannot be written, points that
-            cannot be meant.
+            are of another picture.
         FileFormatError: as `load_examples`, `target_from_points`, `target_from_photo`.
         EstimationError: as `load_examples`, `target_from_points`, `target_from_photo`.
     """
-    tell = progress or (lambda stage, done, total: None)
+    report = progress or no_progress
     check_request(folder, points, photo, output, weights, save_points)
     if save_points is not None:
         check_points_kind(save_points)
-    tell(READING, 0, 0)
+    report(READING, 0, 0)
     synthesizer = Synthesizer(load_examples(folder), options)
-    tell(READING, 1, 1)
-    tell(FINDING if photo else DRAWING, 0, 0)
+    report(READING, 1, 1)
+    report(FINDING if photo else DRAWING, 0, 0)
     if photo is not None:
         target = target_from_photo(synthesizer, photo, face=face)
-        tell(FINDING, 1, 1)
+        report(FINDING, 1, 1)
     else:
         assert points is not None
         target = target_from_points(synthesizer, points, head=head)
-    made = _drawn(synthesizer, target)
-    save_image(output, made.synthesis.image)
+    result = _draw(synthesizer, target)
+    save_image(output, result.synthesis.image)
     if weights is not None:
-        shares, hull_px = made.synthesis.coefficients, made.synthesis.hull_px
-        write_weights(weights, synthesizer.examples, shares, hull_px)
+        synthesis = result.synthesis
+        save_weights(weights, synthesizer.examples, synthesis.coefficients, synthesis.hull_px)
     if save_points is not None:
-        write_points(save_points, synthesizer.examples.layout, made.synthesis.points)
-    tell(DRAWING, 1, 1)
-    return made
+        save_feature_points(save_points, synthesizer.examples.layout, result.synthesis.points)
+    report(DRAWING, 1, 1)
+    return result
 
 
 def hull_note(examples: ExampleSet, hull_px: dict[str, float]) -> str | None:
-    """Which subregions are asked for more than the examples show, the worst first."""
+    """Which subregions lie outside of the hull of the examples, the worst first.
+
+    Args:
+        examples: of the person.
+        hull_px: of each subregion, as `Synthesis.hull_px`.
+    """
     width = face_width(examples.layout, examples.neutral.points)
-    beyond = sorted(hull_px.items(), key=lambda item: -item[1])
-    told = [
+    parts = [
         f"{name.replace('_', ' ')} {px:.1f} px ({px / width:.1%})"
-        for name, px in beyond
+        for name, px in sorted(hull_px.items(), key=lambda item: -item[1])
         if px > HULL_TOLERANCE * width
     ]
-    if not told:
+    if not parts:
         return None
     bound = f"more than {HULL_TOLERANCE:.0%} of the face's width"
-    return f"beyond what the examples show, by {bound}: {', '.join(told)}"
+    return f"beyond what the examples show, by {bound}: {', '.join(parts)}"
 
 
-def _drawn(synthesizer: Synthesizer, target: Target) -> SynthesizedPicture:
-    made = synthesizer.synthesize(target.points, motion=target.motion, size=target.size)
+def _draw(synthesizer: Synthesizer, target: SynthesisTarget) -> SynthesizedPicture:
+    synthesis = synthesizer.synthesize(target.points, motion=target.motion, size=target.size)
     names = synthesizer.examples.subregions.names
-    hull_px = dict(zip(names, made.hull_px.tolist(), strict=True))
+    hull_px = dict(zip(names, synthesis.hull_px.tolist(), strict=True))
     beyond = hull_note(synthesizer.examples, hull_px)
     notes = (*target.notes, *([beyond] if beyond else []))
-    return SynthesizedPicture(made, hull_px, notes)
+    return SynthesizedPicture(synthesis, hull_px, notes)

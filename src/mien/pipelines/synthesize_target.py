@@ -1,8 +1,7 @@
-"""What `mien synthesize` is asked to draw: points of a file, or those of a photo's face."""
+"""The target of `mien synthesize`: all points, from those of a file or of a photo's face."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -10,18 +9,19 @@ from typing import Literal
 import numpy as np
 
 from mien.arrays import Array, Float, Int
+from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.faces.landmarks import inside_picture
 from mien.capture.images.photos import load_photo
 from mien.errors import EstimationError, InputError
 from mien.io.files.atomic import check_file_place, check_files_apart
 from mien.io.files.image import image_kind
-from mien.io.landmarks.points_file import read_points
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.io.landmarks.points_file import load_feature_points
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.pipelines.example_annotations import (
     annotation_files,
     annotation_notes,
     apply_annotations,
-    read_annotated_points,
+    load_annotated_points,
 )
 from mien.synthesis.examples.landmark_averaging import averaged_points
 from mien.synthesis.inference.input_checks import (
@@ -34,20 +34,26 @@ from mien.synthesis.inference.input_checks import (
 )
 from mien.synthesis.synthesizer import MIN_MOTION_POINTS, Synthesizer
 
-__all__ = ["HeadChoice", "Target", "check_request", "target_from_photo", "target_from_points"]
+__all__ = [
+    "HeadChoice",
+    "SynthesisTarget",
+    "check_request",
+    "target_from_photo",
+    "target_from_points",
+]
 
 HeadChoice = Literal["auto", "still", "moved"]
 
-_FAR = 0.5
+_MAX_OUTSIDE = 0.5
 """Face widths beyond the edge of the picture from which points are of another picture."""
 
-_LARGER = 1.5
-"""A face so much larger than in the neutral photo is visibly soft."""
+_SOFT_SCALE = 1.5
+"""A face so many times as large as in the neutral photo is visibly soft."""
 
 
 @dataclass(frozen=True)
-class Target:
-    """What is to be drawn.
+class SynthesisTarget:
+    """The picture to draw.
 
     Attributes:
         points: (n, 2) px of the picture.
@@ -57,7 +63,7 @@ class Target:
     """
 
     points: Float[Array, "n 2"]
-    motion: PlanarMotion | None = None
+    motion: PlanarSimilarity | None = None
     size: tuple[int, int] | None = None
     notes: tuple[str, ...] = ()
 
@@ -68,13 +74,13 @@ def check_request(
     photo: str | Path | None,
     *written: str | Path | None,
 ) -> None:
-    """Refuse what cannot be done before the work is.
+    """Check the files before any work.
 
     Args:
         folder: the examples or the head.
-        points: files, of which one is given.
-        photo: files, of which one is given.
-        written: files that are to be written; the first is the picture.
+        points: file of feature points, or
+        photo: file of one.
+        written: files to write; the first is the picture.
 
     Raises:
         InputError: neither or both, another kind of picture, a file over another one, a place that
@@ -93,21 +99,22 @@ def check_request(
 
 def target_from_points(
     synthesizer: Synthesizer, path: str | Path, *, head: HeadChoice = "auto"
-) -> Target:
+) -> SynthesisTarget:
     """All points from those of a file, px of the neutral photo.
 
     Args:
-        path: as for `read_points`.
-        head: whether it is where the neutral photo has it, or moved: then the points tell how, and
-            the picture moves with it. Of both, "auto" takes what makes the points likelier.
+        synthesizer: of the person.
+        path: as for `load_feature_points`.
+        head: whether it is where the neutral photo has it, or moved: then its motion is estimated
+            from the points, and the picture moves with it. "auto" takes the likelier of both.
 
     Raises:
         InputError: fewer than three points, points that look mirrored or lie far outside.
-        FileFormatError: as `read_points`.
+        FileFormatError: as `load_feature_points`.
         EstimationError: all points in one place.
     """
     layout = synthesizer.examples.layout
-    known, positions = read_points(path, layout)
+    known, positions = load_feature_points(path, layout)
     if len(known) < MIN_MOTION_POINTS:
         expected = f"at least {MIN_MOTION_POINTS} points of {layout.name}"
         raise InputError(path, expected, ", ".join(layout.names[index] for index in known))
@@ -118,21 +125,26 @@ def target_from_points(
     )
     points = synthesizer.complete(known, positions, head="estimated" if moved else "still")
     if not moved:
-        return Target(points, notes=notes)
+        return SynthesisTarget(points, notes=notes)
     if head == "auto":
         notes = (
             *notes,
             f"{path}: the head moved, and so does the picture (--head still: it did not)",
         )
-    return Target(points, synthesizer.head_motion(points), notes=notes)
+    return SynthesisTarget(points, synthesizer.head_motion(points), notes=notes)
 
 
-def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int | None) -> Target:
-    """The points of a photo's face; marks beside the photo win, as for `mien examples`.
+def target_from_photo(
+    synthesizer: Synthesizer, path: str | Path, *, face: int | None
+) -> SynthesisTarget:
+    """The points of a photo's face, or annotated ones beside it, as for `mien examples`.
 
-    Those outside of the photo follow from the others, where enough is known of the person.
+    Those outside of the photo are inferred from the others, where the statistics of the person
+    suffice.
 
     Args:
+        synthesizer: of the person.
+        path: of the photo.
         face: which one, from left to right from 1; None: the largest.
 
     Raises:
@@ -140,35 +152,34 @@ def target_from_photo(synthesizer: Synthesizer, path: str | Path, *, face: int |
         FileFormatError: no photo, or a damaged one; no such face.
         EstimationError: no face in it, or one too small.
     """
-    from mien.capture.faces.detector import LandmarkDetector
-
     layout = synthesizer.examples.layout
     photo = load_photo(path)
     with LandmarkDetector() as detector:
         landmarks = detector.detect(photo, face=face)
-        # As the examples' points are found: see there.
+        # In the same way as the points of the examples: see there.
         detected = averaged_points(layout, detector, photo.pixels, landmarks.points)
-    points = apply_annotations(layout, detected, read_annotated_points(Path(path), photo, layout))
-    points = _guessed_outside(synthesizer, points, photo.size)
+    points = apply_annotations(layout, detected, load_annotated_points(Path(path), photo, layout))
+    points = _complete_outside(synthesizer, points, photo.size)
     motion = synthesizer.head_motion(points)
     notes = [f"{path}: {note}" for note in (*photo.notes, *landmarks.notes)]
-    notes += [*annotation_notes(Path(path), layout), *_stranger_notes(synthesizer, path, points)]
-    if motion.scale > _LARGER:
+    notes += [*annotation_notes(Path(path), layout), *_outlier_notes(synthesizer, path, points)]
+    if motion.scale > _SOFT_SCALE:
         times = f"{float(motion.scale):.1f} times as large as in the examples"
         notes.append(f"{path}: the face is {times}: the picture is as soft as they are")
-    return Target(points, motion, photo.size, tuple(notes))
+    return SynthesisTarget(points, motion, photo.size, tuple(notes))
 
 
-def _guessed_outside(
+def _complete_outside(
     synthesizer: Synthesizer, points: Float[Array, "n 2"], size: tuple[int, int]
 ) -> Float[Array, "n 2"]:
-    """Points beyond the edge of a picture from those inside, where enough is known of the person:
+    """Points with those beyond the edge of a picture inferred from those inside.
 
-    10 to 20 % nearer than the detector's guess where the edge cuts more than the chin (cap13).
+    They are 10 to 20 % nearer than detected ones where the edge cuts more than the chin (cap13).
+    With few statistics the detected ones stay.
     """
     known = np.flatnonzero(inside_picture(points, size))
-    enough = len(synthesizer.examples.statistics) >= MIN_STATISTICS
-    if not enough or not MIN_MOTION_POINTS <= len(known) < len(points):
+    few = len(synthesizer.examples.statistics) < MIN_STATISTICS
+    if few or not MIN_MOTION_POINTS <= len(known) < len(points):
         return points
     return synthesizer.complete(known, points[known], head="estimated")
 
@@ -189,41 +200,35 @@ def _check_sides(
 def _outside_notes(
     synthesizer: Synthesizer, path: str | Path, known: Int[Array, " k"], positions: Array
 ) -> tuple[str, ...]:
-    """That some points lie outside of the picture. Raises: InputError: far outside."""
+    """A note if some points lie outside of the picture.
+
+    Raises:
+        InputError: far outside.
+    """
     layout, neutral = synthesizer.examples.layout, synthesizer.examples.neutral
     height, width = neutral.photo.shape[:2]
-    beyond = _beyond(positions, (width, height))
-    worst = int(beyond.argmax())
-    if beyond[worst] > _FAR * face_width(layout, neutral.points):
+    # px outside of the picture; below 0 inside.
+    outside = np.maximum(-positions, positions - [width, height]).max(axis=1)
+    worst = int(outside.argmax())
+    if outside[worst] > _MAX_OUTSIDE * face_width(layout, neutral.points):
         expected = f"px of the neutral photo, which is {width}x{height}"
-        place = ", ".join(f"{number:g}" for number in positions[worst])
-        raise InputError(path, expected, f"{layout.names[known[worst]]} at {place}")
-    told = _told_outside(layout.names, known, beyond)
-    return (f"{path}: {told}",) if told else ()
+        position = ", ".join(f"{number:g}" for number in positions[worst])
+        raise InputError(path, expected, f"{layout.names[known[worst]]} at {position}")
+    count = int((outside > 0).sum())
+    if not count:
+        return ()
+    name = layout.names[known[worst]]
+    return (f"{path}: {count} of {len(known)} points lie outside of the picture, {name} farthest",)
 
 
-def _beyond(points: Float[Array, "k 2"], size: tuple[int, int]) -> Float[Array, " k"]:
-    """How far points lie outside of a picture, px; below 0 inside."""
-    return np.maximum(-points, points - size).max(axis=1)
-
-
-def _told_outside(
-    names: Sequence[str], known: Int[Array, " k"], beyond: Float[Array, " k"]
-) -> str | None:
-    count = int((beyond > 0).sum())
-    farthest = names[known[int(beyond.argmax())]]
-    told = f"{count} of {len(known)} points lie outside of the picture, {farthest} farthest"
-    return told if count else None
-
-
-def _stranger_notes(
+def _outlier_notes(
     synthesizer: Synthesizer, path: str | Path, points: Float[Array, "n 2"]
 ) -> list[str]:
-    odd = mahalanobis_rms(synthesizer.examples, points)
-    if odd is None or odd < OUTLIER_RMS:
+    distance = mahalanobis_rms(synthesizer.examples, points)
+    if distance is None or distance < OUTLIER_RMS:
         return []
     return [
         f"{path}: the face looks like another person's, or is turned far: its shape is "
-        f"{odd / OUTLIER_RMS:.1f} times as far as usual from all that was seen of this person; "
-        "its points are taken as they are"
+        f"{distance / OUTLIER_RMS:.1f} times as far as usual from all that was seen of this "
+        "person; its points are taken as they are"
     ]

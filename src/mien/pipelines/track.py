@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING
 
 from mien.arrays import check_positive
 from mien.capture.faces.detector import LandmarkDetector
@@ -21,16 +20,14 @@ from mien.pipelines.tracking.notes import check_found, track_notes
 from mien.pipelines.tracking.outputs import OVERLAY, TrackFiles
 from mien.pipelines.tracking.ready_head import ReadyHead
 from mien.pipelines.tracking.run import TRACKING, TrackRun
-from mien.reading.names import named_path
+from mien.progress import Progress, no_progress
+from mien.reading.names import check_path
 from mien.track.lens import parse_lens
 from mien.track.smoothing import smooth
 from mien.track.state import STATUSES, Status, Track
 from mien.track.tracker import TrackOptions
 
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
-
-MAX_SIDE = 1920
+TRACKING_SIDE = 1920
 """px; larger pictures are tracked reduced to it. Reducing smaller ones would take longer than it
 saves: a face is compared at a size of its own anyway."""
 COUNTED = (LENS, TRACKING, OVERLAY)
@@ -40,7 +37,7 @@ STARTED_OVER = "the run that was not finished was started over; it could have be
 
 @dataclass(frozen=True)
 class Tracked:
-    """What came of a video.
+    """How the tracking of a video went.
 
     Attributes:
         frames: how many.
@@ -61,7 +58,7 @@ class Tracked:
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        """`448 frames, 2 found again, 3 lost, 31.2 frames/s, error 6.1 grey levels`"""
+        """`448 frames, 2 found again, 3 lost, 31.2 frames/s, error 6.1 grey levels`."""
         parts = [
             f"{self.frames} frames",
             f"{self.resumed} from before" * bool(self.resumed),
@@ -82,20 +79,28 @@ def track_video(
     smooth_seconds: float | None = None,
     resume: bool = False,
     options: TrackOptions | None = None,
-    max_side: int = MAX_SIDE,
+    max_side: int = TRACKING_SIDE,
     progress: Progress | None = None,
 ) -> Tracked:
-    """Track a head through a video and write what was found, each file whole or not at all.
+    """Track a head through a video and write its pose and expression in every frame.
 
     Every frame goes into a journal beside the table at once. A run that is stopped leaves it; one
     that resumes goes on from there and gives the same files, byte for byte, as an unbroken one.
+    `load_track` reads the table.
 
     Args:
+        video: the file.
+        head: of the person in it.
+        files: where the results go, each written whole or not at all.
         lens: as for track.lens.parse_lens; estimated over the first frames unless given.
         smooth_seconds: as track.smoothing.smooth; nothing is smoothed unless given.
         resume: go on where an earlier run was stopped; from the start where there was none.
+        options: how; the defaults unless given.
         max_side: px; larger pictures are tracked reduced to it.
-        progress: told the stage, the frames done and their total.
+        progress: called with the stage, frames done and their total.
+
+    Returns:
+        How many frames were tracked and how well, and notes for the user.
 
     Raises:
         InputError: before any work is done, a video or a place that cannot be used, a lens, a
@@ -103,8 +108,8 @@ def track_video(
         FileFormatError: as InputError.
         EstimationError: when all is written, a video whose frames are all lost.
     """
-    tell = progress or (lambda stage, done, total: None)
-    clip = Video(named_path("video", video, "a video"))
+    tell = progress or no_progress
+    clip = Video(check_path("video", video, "a video"))
     files.check(clip.path)
     if smooth_seconds is not None:
         check_positive("smooth_seconds", smooth_seconds)

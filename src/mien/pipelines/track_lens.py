@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import islice
-from typing import TYPE_CHECKING
 
 from mien.arrays import Array, UInt8
 from mien.capture.video.frames_ahead import frames_ahead
 from mien.capture.video.video import Video, VideoFacts
 from mien.pipelines.tracking.ready_head import ReadyHead
+from mien.progress import Progress
 from mien.track.landmarks.focal import estimate_focal
 from mien.track.lens import expected_focal
-
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
 
 LENS = "Finding the focal length"
 _FIRST, _EVERY, _SIDE = 300, 5, 1280

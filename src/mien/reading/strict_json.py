@@ -6,14 +6,16 @@ import difflib
 import json
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 
 from mien.arrays import Array
-from mien.errors import Broken, FileFormatError
+from mien.errors import DocumentError, FileFormatError, InputError
 from mien.limits import LARGEST, MAX_CONTAINERS, MAX_DEPTH, MAX_DIGITS, MAX_JSON_BYTES
 from mien.reading.files import read_text
 
@@ -28,7 +30,7 @@ def read_json(path: str | Path) -> dict[str, Any]:
     """
     data = parse_json(path, read_text(path, MAX_JSON_BYTES, "JSON in UTF-8"))
     if not isinstance(data, dict):
-        raise FileFormatError(path, f"expected an object, found {kind_of(data)}")
+        raise FileFormatError(path, f"expected an object, found {json_type(data)}")
     return data
 
 
@@ -66,48 +68,94 @@ def parse_json(path: str | Path, text: str, *, line: int | None = None) -> Any:
     return data
 
 
-def check_format(data: Mapping[str, Any], name: str, version: int) -> None:
-    """Raises: Broken: another format than this one, or a version of it newer than this."""
-    if data.get("format") != name:
-        raise Broken("format", f"expected {name!r}, found {str(data.get('format'))[:40]!r}")
-    found = as_whole(data.get("version"), "version", above=0)
-    if found > version:
-        by = f" ({str(data['generator'])[:40]})" if "generator" in data else ""
-        problem = f"{found} was written by a newer mien{by}; this one reads up to {version}"
-        raise Broken("version", problem)
+@dataclass(frozen=True)
+class DocumentFormat:
+    """What a document of mien says that it is.
+
+    Attributes:
+        name: its `format`.
+        version: its `version`: the one that is written, and the newest that can be read.
+    """
+
+    name: str
+    version: int
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """What a document of this format begins with."""
+        return {"format": self.name, "version": self.version}
+
+    def check(self, data: Mapping[str, Any]) -> None:
+        """Raises: DocumentError: another format than this one, or a newer version of it."""
+        if data.get("format") != self.name:
+            found = str(data.get("format"))[:40]
+            raise DocumentError("format", f"expected {self.name!r}, found {found!r}")
+        version = as_whole(data.get("version"), "version", above=0)
+        if version > self.version:
+            by = f" ({str(data['generator'])[:40]})" if "generator" in data else ""
+            limit = f"this one reads up to {self.version}"
+            raise DocumentError("version", f"{version} was written by a newer mien{by}; {limit}")
+
+    def is_in(self, path: str | Path) -> bool:
+        """Whether a file holds a document of this format, of whatever version."""
+        try:
+            return bool(read_json(path).get("format") == self.name)
+        except (FileFormatError, InputError):
+            return False
+
+
+@contextmanager
+def errors_name_file(path: str | Path, line: int | None = None) -> Iterator[None]:
+    """Let what is wrong in a document be an error that names the file that it was read from.
+
+    Args:
+        path: the file.
+        line: of the file that the document is, if it is but one of them.
+
+    Raises:
+        FileFormatError: for a DocumentError or an InputError in the block.
+    """
+    within = "" if line is None else f"line {line}, "
+    try:
+        yield
+    except DocumentError as error:
+        raise FileFormatError(path, error.problem, f"{within}{error.place}") from None
+    except InputError as error:
+        problem = f"expected {error.expected}, found {error.got}"
+        raise FileFormatError(path, problem, f"{within}{error.name}") from None
 
 
 def as_object(value: object, place: str, keys: Iterable[str] | None = None) -> dict[str, Any]:
-    """An object with none but these keys. Raises: Broken: suggests the nearest keys."""
+    """An object with none but these keys. Raises: DocumentError: suggests the nearest keys."""
     if not isinstance(value, dict):
         complain(place, "an object", value)
     if keys is not None:
         known = tuple(keys)
         for key in value:
             if key not in known:
-                raise Broken(join(place, key), unknown("key", key, known))
+                raise DocumentError(join(place, key), unknown("key", key, known))
     return value
 
 
 def as_list(value: object, place: str) -> list[Any]:
-    """A list. Raises: Broken."""
+    """A list. Raises: DocumentError."""
     if not isinstance(value, list):
         complain(place, "a list", value)
     return value
 
 
 def as_text(value: object, place: str) -> str:
-    """Text. Raises: Broken."""
+    """Text. Raises: DocumentError."""
     if not isinstance(value, str):
         complain(place, "text", value)
     return value
 
 
 def as_choice(value: object, place: str, kind: str, names: Collection[str]) -> str:
-    """One of these names. Raises: Broken: suggests the nearest ones."""
+    """One of these names. Raises: DocumentError: suggests the nearest ones."""
     name = as_text(value, place)
     if name not in names:
-        raise Broken(place, unknown(kind, name, names))
+        raise DocumentError(place, unknown(kind, name, names))
     return name
 
 
@@ -119,7 +167,7 @@ def as_number(
     least: float = -LARGEST,
     most: float = LARGEST,
 ) -> float:
-    """A finite number within these limits: above the one, or from the other on. Raises: Broken."""
+    """A finite number above one limit or from the other on. Raises: DocumentError."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         complain(place, "a number", value)
     try:
@@ -127,12 +175,14 @@ def as_number(
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise Broken(place, f"expected a finite number, found {number}")
+        raise DocumentError(place, f"expected a finite number, found {number}")
     if above is not None and not above < number <= most:
         limits = f"above {above:g} and at most {most:g}"
-        raise Broken(place, f"expected a number {limits}, found {number:g}")
+        raise DocumentError(place, f"expected a number {limits}, found {number:g}")
     if not least <= number <= most:
-        raise Broken(place, f"expected a number from {least:g} to {most:g}, found {number:g}")
+        raise DocumentError(
+            place, f"expected a number from {least:g} to {most:g}, found {number:g}"
+        )
     return number
 
 
@@ -144,7 +194,7 @@ def as_whole(
     least: float = -LARGEST,
     most: float = LARGEST,
 ) -> int:
-    """A whole number within these limits. Raises: Broken."""
+    """A whole number within these limits. Raises: DocumentError."""
     if isinstance(value, bool) or not isinstance(value, int):
         complain(place, "a whole number", value)
     as_number(value, place, above=above, least=least, most=most)
@@ -152,30 +202,30 @@ def as_whole(
 
 
 def as_array(value: object, place: str, shape: tuple[int, ...]) -> Array:
-    """Nested lists of finite numbers as an array of this shape. Raises: Broken."""
+    """Nested lists of finite numbers as an array of this shape. Raises: DocumentError."""
     if not shape:
         return np.array(as_number(value, place))
     items = as_list(value, place)
     if len(items) != shape[0]:
         what = "numbers" if len(shape) == 1 else "lists"
-        raise Broken(place, f"expected {shape[0]} {what}, found {len(items)}")
+        raise DocumentError(place, f"expected {shape[0]} {what}, found {len(items)}")
     rows = [as_array(item, f"{place}[{i}]", shape[1:]) for i, item in enumerate(items)]
     return np.array(rows, dtype=np.float64).reshape(shape)
 
 
 def as_names(value: object, place: str) -> tuple[str, ...]:
-    """A list of texts, each once. Raises: Broken."""
+    """A list of texts, each once. Raises: DocumentError."""
     names = tuple(as_text(name, f"{place}[{i}]") for i, name in enumerate(as_list(value, place)))
     for name, count in Counter(names).items():
         if count > 1:
-            raise Broken(place, f"{name[:60]!r} appears twice")
+            raise DocumentError(place, f"{name[:60]!r} appears twice")
     return names
 
 
 def need(data: Mapping[str, Any], key: str, place: str) -> Any:
-    """data[key]. Raises: Broken: there is none."""
+    """data[key]. Raises: DocumentError: there is none."""
     if key not in data:
-        raise Broken(join(place, key), "missing")
+        raise DocumentError(join(place, key), "missing")
     return data[key]
 
 
@@ -195,7 +245,7 @@ def unknown(kind: str, name: str, known: Collection[str]) -> str:
     return f"unknown {kind} {name!r}; expected one of {few}" if few else f"unknown {kind} {name!r}"
 
 
-def kind_of(value: object) -> str:
+def json_type(value: object) -> str:
     """What JSON calls a value like this one."""
     if value is None:
         return "null"
@@ -204,9 +254,9 @@ def kind_of(value: object) -> str:
 
 
 def complain(place: str, expected: str, value: object) -> NoReturn:
-    """Raises: Broken: says what kind of value is there instead."""
+    """Raises: DocumentError: says what kind of value is there instead."""
     shown = f" {str(value)[:40]!r}" if isinstance(value, str) else ""
-    raise Broken(place, f"expected {expected}, found {kind_of(value)}{shown}")
+    raise DocumentError(place, f"expected {expected}, found {json_type(value)}{shown}")
 
 
 class _RepeatedName(Exception):

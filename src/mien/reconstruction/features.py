@@ -12,7 +12,7 @@ from mien.arrays import Array, Bool, Float, Int
 from mien.assets.generic import GenericHead
 from mien.assets.landmark_sets import FACE_OVAL, ON_EDGES
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.errors import InputError
 from mien.reconstruction.curves import match_curve, resample_curve
 
@@ -23,7 +23,7 @@ CURVE_SIGMA_MM = 1.0
 EDGE_SIGMA_MM = 2.5
 """How far a landmark on an eye, brow, lip or the nose slides over the skin between views."""
 SKIN_SIGMA_MM = 12.0
-"""The same for one on plain skin, which the detector only guesses (docs/pose-recovery.md)."""
+"""The same for one on plain skin, which the detector only guesses (docs/method/cameras.md)."""
 MIN_CONFIDENCE = 0.1
 """Landmarks below are not used: the surface turns away there."""
 ENOUGH_NAMED = 8
@@ -85,7 +85,7 @@ class Features:
         )
 
 
-def gather_features(views: Sequence[View], generic: GenericHead) -> Features:
+def gather_features(views: Sequence[CapturedView], generic: GenericHead) -> Features:
     """Hand-made marks and curves of all photos, and landmarks where those are silent.
 
     Drawn curves become points by arc length; `rematch_curves` improves on that once cameras are
@@ -143,7 +143,10 @@ def image_points_for_cameras(features: Features) -> Float[Array, "k n 2"]:
 
 
 def rematch_curves(
-    features: Features, views: Sequence[View], cameras: Sequence[Camera], generic: GenericHead
+    features: Features,
+    views: Sequence[CapturedView],
+    cameras: Sequence[Camera],
+    generic: GenericHead,
 ) -> Features:
     """Points of the drawn curves moved along them to where the epipolar lines say.
 
@@ -190,7 +193,7 @@ def _names(generic: GenericHead, vertices: list[int]) -> list[str]:
     return [named[vertex] for vertex in vertices]
 
 
-def _curve_points(view: View, generic: GenericHead) -> dict[int, Float[Array, " 2"]]:
+def _curve_points(view: CapturedView, generic: GenericHead) -> dict[int, Float[Array, " 2"]]:
     """Every drawn curve's points by arc length, by vertex of its polyline."""
     points: dict[int, Float[Array, " 2"]] = {}
     for name, curve in (view.annotations.curves if view.annotations else {}).items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,9 +10,10 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.faces.detector import NO_FACE
-from mien.capture.source import View
+from mien.capture.faces.detector import NO_FACE_FOUND
+from mien.capture.source import CapturedView
 from mien.errors import EstimationError
+from mien.progress import StepProgress
 from mien.reconstruction.features import gather_features
 from mien.reconstruction.landmark_fit import FitOptions, Solution, residuals_of, solve_by_features
 from mien.reconstruction.outliers import (
@@ -36,8 +37,6 @@ ONE_SIDE = "it looks from the same side as {}, and would only blur what that one
 NEARER_TELLS = 1.3
 """Unless one is taken from so many times the distance of another: perspective tells it, too."""
 
-Progress = Callable[[int, int], None]
-
 
 @dataclass(frozen=True)
 class Fit:
@@ -59,11 +58,11 @@ class Fit:
 
 
 def fit_views(
-    views: Sequence[View],
+    views: Sequence[CapturedView],
     generic: GenericHead,
     options: FitOptions,
     *,
-    progress: Progress | None = None,
+    progress: StepProgress | None = None,
 ) -> Fit:
     """Cameras and shape of one expression.
 
@@ -74,7 +73,8 @@ def fit_views(
         EstimationError: no photo fits.
 
     Source:
-        [Pighin 2002] sec. 5.1; the registration of several photos is ours (docs/registration.md).
+        [Pighin 2002] sec. 5.1; the registration of several photos is ours
+        (docs/method/registration.md).
     """
     from threadpoolctl import threadpool_limits
 
@@ -84,13 +84,16 @@ def fit_views(
 
 
 def _fit_views(
-    views: Sequence[View], generic: GenericHead, options: FitOptions, progress: Progress | None
+    views: Sequence[CapturedView],
+    generic: GenericHead,
+    options: FitOptions,
+    progress: StepProgress | None,
 ) -> Fit:
     marked = [view for view in views if view.marked]
     faceless = [view for view in views if not view.marked]
     if not marked:
         names = ", ".join(view.photo.name for view in views)
-        raise EstimationError(f"{names}: {NO_FACE}")
+        raise EstimationError(f"{names}: {NO_FACE_FOUND}")
     left_out: dict[str, str] = {}
     while True:
         solution = solve_by_features(marked, gather_features(marked, generic), generic, options)
@@ -105,7 +108,7 @@ def _fit_views(
         solution = _all_photos(solution, faceless, generic, options, progress)
         left_out |= solution.problems
     else:
-        left_out |= {view.photo.name: NO_FACE for view in faceless}
+        left_out |= {view.photo.name: NO_FACE_FOUND for view in faceless}
     if options.adjust:
         solution = _guided(solution, generic)
     vertices, cameras = _in_head_space(solution, generic, options)
@@ -121,10 +124,10 @@ def _fit_views(
 
 def _all_photos(
     solution: Solution,
-    faceless: Sequence[View],
+    faceless: Sequence[CapturedView],
     generic: GenericHead,
     options: FitOptions,
-    progress: Progress | None,
+    progress: StepProgress | None,
 ) -> Solution:
     """The solution by the skin that the photos share; where they look from one side, one's own."""
     if faceless or len(solution.views) == 1 or not _from_one_side(solution.cameras):

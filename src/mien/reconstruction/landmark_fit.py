@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.reconstruction.bundle.adjustment import Adjustment, FocalPrior, ShapePrior, adjust_bundle
 from mien.reconstruction.features import Features, image_points_for_cameras, rematch_curves
@@ -26,7 +26,7 @@ FOCAL_PRIOR_DEVIATION = 0.6
 EXIF_DEVIATION = 0.05
 NAMED_SIGMA_MM = 2.0
 """How far a marked point lies off the identity basis, each axis: what a name means differs between
-faces and between people who mark them (docs/pose-recovery.md)."""
+faces and between people who mark them (docs/method/cameras.md)."""
 ATTACHED_SIGMA_MM = 1.5
 """The same for a landmark: the detector that finds it also attached it to the generic head."""
 NEAREST_MM = 150.0
@@ -64,7 +64,7 @@ class FitOptions:
 class Solution:
     """Cameras and shape in the frame and scale of the solver."""
 
-    views: Sequence[View]
+    views: Sequence[CapturedView]
     features: Features
     cameras: tuple[Camera, ...]
     vertices: Float[Array, "v 3"]
@@ -83,7 +83,7 @@ class Solution:
 
 
 def solve_by_features(
-    views: Sequence[View], features: Features, generic: GenericHead, options: FitOptions
+    views: Sequence[CapturedView], features: Features, generic: GenericHead, options: FitOptions
 ) -> Solution:
     """[Pighin 2002]'s five steps, then, repeated: curves, joint adjustment or rays, shape."""
     try:
@@ -122,7 +122,7 @@ def solve_by_features(
 
 
 def _adjust(
-    views: Sequence[View],
+    views: Sequence[CapturedView],
     features: Features,
     cameras: tuple[Camera, ...],
     points: Float[Array, "n 3"],
@@ -142,8 +142,8 @@ def _adjust(
         sigma_px=np.where(features.seen, features.sigma_px(cameras), 1.0),
         loss="cauchy",
         shape_prior=prior,
-        focal_prior=focal_beliefs(views),
-        focal_group=same_lens(views),
+        focal_prior=focal_priors(views),
+        focal_group=focal_groups(views),
     )
 
 
@@ -156,7 +156,7 @@ def _intersect(
     return rays.points, np.where(rays.solved, rays.residual_mm, PRIOR_DEVIATION_MM)
 
 
-def focal_beliefs(views: Sequence[View]) -> FocalPrior:
+def focal_priors(views: Sequence[CapturedView]) -> FocalPrior:
     """EXIF where the photo has it; otherwise anything from a phone to a cropped portrait."""
     known = [view.photo.focal_prior_px for view in views]
     diagonals = [float(np.hypot(*view.photo.size)) for view in views]
@@ -168,7 +168,7 @@ def focal_beliefs(views: Sequence[View]) -> FocalPrior:
     return FocalPrior(np.array(focal), np.array(deviation))
 
 
-def same_lens(views: Sequence[View]) -> Int[Array, " k"]:
+def focal_groups(views: Sequence[CapturedView]) -> Int[Array, " k"]:
     """(K,) the same number for photos of one lens: the frames of a video."""
     files = [view.photo.path for view in views]
     return np.array([files.index(file) for file in files])

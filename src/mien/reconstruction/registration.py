@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +10,11 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
-from mien.reconstruction.dense.joint import Lenses
+from mien.progress import StepProgress
+from mien.reconstruction.bundle.problem import FocalGroups
 from mien.reconstruction.dense.register import (
     SCALES_MM,
     Registration,
@@ -21,10 +22,8 @@ from mien.reconstruction.dense.register import (
     register_views,
 )
 from mien.reconstruction.features import gather_features
-from mien.reconstruction.landmark_fit import Solution, focal_beliefs, residuals_of, same_lens
+from mien.reconstruction.landmark_fit import Solution, focal_groups, focal_priors, residuals_of
 from mien.reconstruction.localization.localizer import place_views
-
-Progress = Callable[[int, int], None]
 
 NOTHING_SHARED = (
     "the photos share too little skin to be registered with each other: cameras and shape rest on "
@@ -46,9 +45,9 @@ NOT_PLACED = "no face was found in it, and it does not look like the head that t
 
 def register_solution(
     solution: Solution,
-    faceless: Sequence[View],
+    faceless: Sequence[CapturedView],
     generic: GenericHead,
-    progress: Progress | None = None,
+    progress: StepProgress | None = None,
 ) -> Solution:
     """The solution by all the skin that its photos share, with the photos placed by it added.
 
@@ -86,10 +85,10 @@ def _registered(
     solution: Solution,
     generic: GenericHead,
     scales: Sequence[float],
-    progress: Progress | None,
+    progress: StepProgress | None,
 ) -> Solution:
-    views, lenses = solution.views, _lenses(solution.views)
-    known = (views, solution.cameras, solution.vertices, solution.features, lenses, generic)
+    views, focal = solution.views, _focal_groups(solution.views)
+    known = (views, solution.cameras, solution.vertices, solution.features, focal, generic)
     found: Registration | None = None
     notes: tuple[str, ...] = ()
     if len(views) > 1:
@@ -154,11 +153,11 @@ def _far_turned(
     )
 
 
-def _lenses(views: Sequence[View]) -> Lenses:
-    focal = focal_beliefs(views)
-    group = np.unique(same_lens(views), return_inverse=True)[1].reshape(-1)
+def _focal_groups(views: Sequence[CapturedView]) -> FocalGroups:
+    focal = focal_priors(views)
+    group = np.unique(focal_groups(views), return_inverse=True)[1].reshape(-1)
     count = np.bincount(group)
-    return Lenses(
+    return FocalGroups(
         group,
         np.bincount(group, np.log(focal.focal_px)) / count,
         np.bincount(group, focal.deviation) / count,

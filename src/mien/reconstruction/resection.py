@@ -8,7 +8,7 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.reconstruction.features import Features
 
@@ -17,7 +17,7 @@ LEAST_FEATURES = 4
 
 
 def place_cameras(
-    views: Sequence[View],
+    views: Sequence[CapturedView],
     features: Features,
     focal_px: Float[Array, " k"],
     vertices: Float[Array, "v 3"],
@@ -42,7 +42,7 @@ def place_cameras(
 
 
 def _place(
-    view: View, places: Float[Array, "n 3"], image: Float[Array, "n 2"], focal_px: float
+    view: CapturedView, places: Float[Array, "n 3"], image: Float[Array, "n 2"], focal_px: float
 ) -> Camera:
     import cv2
 

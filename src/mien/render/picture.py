@@ -48,7 +48,7 @@ class HeadRenderer:
         *,
         size: tuple[int, int] = (800, 1000),
     ) -> Camera:
-        """The camera that sees the head turned like this (radians, docs/conventions.md).
+        """The camera that sees the head turned like this (radians, docs/reference/conventions.md).
 
         Framed by the neutral head, so that an open mouth does not change the scale.
         """
@@ -88,13 +88,13 @@ def render_head(
     state: FaceState | None = None,
     background: tuple[int, int, int] | None = None,
 ) -> UInt8[Array, "h w 4"]:
-    """The textured head, RGBA.
+    """A picture of the textured head, (H, W, 4) sRGB with alpha.
 
     Args:
-        head: or what HeadRenderer prepared of it, for many pictures of one head.
-        yaw: radians, as docs/conventions.md says.
-        pitch: radians, as docs/conventions.md says.
-        roll: radians, as docs/conventions.md says.
+        head: the head, or a HeadRenderer of it, which is faster for many pictures.
+        yaw: radians, as docs/reference/conventions.md says.
+        pitch: radians, as docs/reference/conventions.md says.
+        roll: radians, as docs/reference/conventions.md says.
         size: width and height in px; with `photo`, the photo's own.
         photo: reproduce the view of this photo instead of turning the head: its camera and, unless
             the state says which expressions to mix, the expression that it belongs to.

@@ -13,21 +13,26 @@ from mien.report.track.caption import write_on
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
 _CELL = (240, 300)
-"""Width and height of a face's picture, px."""
+"""Width and height of a face, px."""
 _MARGIN = 0.18
-_LETTERS, _LINES, _SIZE = 34, 3, 13
+_LINE_LENGTH, _LINES, _FONT_SIZE = 34, 3, 13
 _PAPER, _INK, _LIGHT_INK = 255, (20, 20, 24), (96, 98, 106)
 
 
 def example_sheet(
     example_set: ExampleSet, why: Mapping[str, str], *, columns: int = 8
 ) -> UInt8[Array, "h w 3"]:
-    """All examples in their order, cut to the face."""
+    """All examples in their order, cropped to the face.
+
+    Args:
+        example_set: of the person.
+        why: each was chosen, by name.
+        columns: of the sheet.
+    """
     cells = []
     for index, example in enumerate(example_set.examples):
-        words = [example.name, why.get(example.name, "")]
-        words[1] += ", shows teeth" * (index in example_set.teeth)
-        cells.append(np.concatenate([_face(example), _words(*words)]))
+        reason = why.get(example.name, "") + ", shows teeth" * (index in example_set.teeth)
+        cells.append(np.concatenate([_face(example), _caption(example.name, reason)]))
     return arranged(cells, columns)
 
 
@@ -39,18 +44,20 @@ def _face(example: Example) -> UInt8[Array, "h w 3"]:
     middle, extent = (low + high) / 2, (1 + 2 * _MARGIN) * (high - low)
     scale = float(min(_CELL / extent))
     matrix = np.array([[scale, 0, 0], [0, scale, 0]])
-    # Of the middle, in OpenCV's pixels, whose first has its centre at 0.
+    # The centre of OpenCV's first pixel is 0, ours 0.5.
     matrix[:, 2] = np.array(_CELL) / 2 - 0.5 - scale * (middle - 0.5)
-    how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
-    return cv2.warpAffine(example.photo, matrix, _CELL, flags=how, borderMode=cv2.BORDER_REPLICATE)
+    interpolation = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
+    return cv2.warpAffine(
+        example.photo, matrix, _CELL, flags=interpolation, borderMode=cv2.BORDER_REPLICATE
+    )
 
 
-def _words(name: str, reason: str) -> UInt8[Array, "h w 3"]:
-    lines = [name, *textwrap.wrap(reason, _LETTERS)[:_LINES]]
-    height = round(1.35 * _SIZE * (_LINES + 1)) + 6
+def _caption(name: str, reason: str) -> UInt8[Array, "h w 3"]:
+    lines = [name, *textwrap.wrap(reason, _LINE_LENGTH)[:_LINES]]
+    height = round(1.35 * _FONT_SIZE * (_LINES + 1)) + 6
     strip = np.full((height, _CELL[0], 3), _PAPER, np.uint8)
     for number, line in enumerate(lines):
-        at = (0.5, (1.35 * _SIZE * (number + 0.5) + 3) / height)
+        at = (0.5, (1.35 * _FONT_SIZE * (number + 0.5) + 3) / height)
         colour = _LIGHT_INK if number else _INK
-        strip = write_on(strip, line, colour, at=at, size=_SIZE)
+        strip = write_on(strip, line, colour, at=at, size=_FONT_SIZE)
     return strip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.camera import Camera
 from mien.head import Head
+from mien.progress import StepProgress, no_step_progress
 from mien.reconstruction.expression.fit import ExpressionFit
 from mien.reconstruction.fit import Fit
 from mien.reconstruction.outliers import Mark, PhotoFit
@@ -46,9 +47,7 @@ class ReportInput:
     turntable: str = ""
 
 
-def render_report(
-    data: ReportInput, *, progress: Callable[[int, int], None] = lambda done, total: None
-) -> str:
+def render_report(data: ReportInput, *, progress: StepProgress = no_step_progress) -> str:
     """The page's HTML.
 
     Args:
@@ -90,7 +89,7 @@ def _photo(
     fit: PhotoFit,
     pixels: UInt8[Array, "h w 3"],
 ) -> dict[str, Any]:
-    yaw, pitch, roll = head_angles(fit.camera)
+    yaw, pitch, roll = head_angles_deg(fit.camera)
     return {
         "name": name,
         "width": fit.camera.width,
@@ -118,8 +117,8 @@ def _residual(mark: Mark) -> dict[str, Any]:
     }
 
 
-def head_angles(camera: Camera) -> tuple[float, float, float]:
-    """Degrees of yaw, pitch and roll of the head before the camera (docs/conventions.md).
+def head_angles_deg(camera: Camera) -> tuple[float, float, float]:
+    """Degrees of yaw, pitch and roll of the head before the camera (docs/reference/conventions.md).
 
     The same three angles given to `mien render` show the head turned like that.
     """

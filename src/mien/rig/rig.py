@@ -39,7 +39,8 @@ class Rig:
 
     Source:
         [Pighin 2002] sec. 6.1.1: consensus geometry, weights by region. Units, contacts and what of
-        an expression comes along with the units that explain it are ours (docs/expressions.md).
+        an expression comes along with the units that explain it are ours
+        (docs/method/expressions.md).
     """
 
     def __init__(self, head: Head) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from mien.arrays import Array, Float, Int, UInt8, check_array, frozen
 from mien.errors import InputError
-from mien.numeric.planar_similarity import PlanarMotion, estimate_planar_motion
+from mien.numeric.planar_similarity import PlanarSimilarity, estimate_planar_similarity
 from mien.synthesis.composition.composer import Composer
 from mien.synthesis.examples.example_set import ExampleSet
 from mien.synthesis.examples.head_alignment import align_to_neutral
@@ -172,7 +172,7 @@ class Synthesizer:
             raise InputError("examples", "points of 2 pictures or more to complete others from", 1)
         _check_choice("head", head, HeadMotionMode)
         estimated = head == "estimated" and len(subset) >= MIN_MOTION_POINTS
-        motion = estimate_planar_motion(neutral[subset], given) if estimated else None
+        motion = estimate_planar_similarity(neutral[subset], given) if estimated else None
         aligned = given if motion is None else motion.undo(given)
         inferred = self._model(subset, estimated).infer(subset, aligned - neutral[subset])
         completed = neutral + inferred.displacements
@@ -181,7 +181,7 @@ class Synthesizer:
         completed[subset] = given
         return completed
 
-    def head_motion(self, points: Float[Array, "n 2"]) -> PlanarMotion:
+    def head_motion(self, points: Float[Array, "n 2"]) -> PlanarSimilarity:
         """The head's motion from the neutral photo to another one.
 
         Args:
@@ -200,7 +200,7 @@ class Synthesizer:
         self,
         points: Float[Array, "n 2"],
         *,
-        motion: PlanarMotion | None = None,
+        motion: PlanarSimilarity | None = None,
         size: tuple[int, int] | None = None,
         out: UInt8[Array, "h w 3"] | None = None,
     ) -> Synthesis:
@@ -227,7 +227,7 @@ class Synthesizer:
             distance_penalty=self.options.distance_penalty,
             slack=self.options.slack,
             tied=self.options.tied,
-            only=self.examples.only,
+            subsets=self.examples.subsets,
         )
         image = self._composer.render(points, coefficients, motion=motion, size=size, out=out)
         hull_px = mixture_distances(offsets, coefficients, subregions)

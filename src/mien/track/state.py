@@ -126,7 +126,7 @@ class TrackedFrame:
 
 @dataclass(frozen=True)
 class Track:
-    """A whole performance.
+    """Head and face in every frame of a video; `series_of` gives its numbers as arrays.
 
     Attributes:
         layout: of every frame's numbers.

@@ -39,7 +39,7 @@ _LEAST_LIKENESS, _LEAST_SEEN = 0.6, 0.3
 STRANGE_RMS = 20.0
 """Grey levels by which a drawn face is off from which on it is hardly the person's. Four heads are
 off by 3 to 11 on the median frame of clips of their people and by 19.3 on the worst, on other
-people's clips by 19.5 to 161 (docs/tracking-method.md)."""
+people's clips by 19.5 to 161 (docs/method/tracking.md)."""
 _UNUSUAL = 2.0
 """So many times as far off as in the best tenth of the frames before, a face that is not where it
 was in the last frame is another person's, if it is strange, too."""
@@ -61,7 +61,7 @@ class TrackOptions:
         units: names of face units to track; by default blinks for a head with photographed
             expressions, and all that a front view shows for one without.
         steady: whether steps that cannot be told from noise are taken in part only; off, every
-            frame stands for itself (docs/tracking-method.md).
+            frame stands for itself (docs/method/tracking.md).
     """
 
     fit: FitOptions = field(default_factory=FitOptions)

@@ -20,8 +20,8 @@ from mien.errors import FileFormatError, InputError
 from mien.io.examples.example_folder import (
     is_example_folder,
     load_examples,
-    read_reasons,
-    write_examples,
+    load_reasons,
+    save_examples,
 )
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
@@ -52,7 +52,7 @@ def example_set(layout: FeatureLayout) -> ExampleSet:
 
 @pytest.fixture
 def folder(tmp_path: Path, example_set: ExampleSet) -> Path:
-    write_examples(tmp_path / "set", example_set, why=WHY)
+    save_examples(tmp_path / "set", example_set, why=WHY)
     return tmp_path / "set"
 
 
@@ -76,7 +76,7 @@ def assert_same(found: ExampleSet, expected: ExampleSet) -> None:
 
 def test_what_is_written_is_read_again_exactly(folder: Path, example_set: ExampleSet) -> None:
     assert_same(load_examples(folder), example_set)
-    assert read_reasons(folder) == WHY
+    assert load_reasons(folder) == WHY
     assert not (folder / "subregions.npz").exists()
 
 
@@ -84,7 +84,7 @@ def test_subregions_of_ones_own_are_kept(tmp_path: Path, example_set: ExampleSet
     fades = np.random.default_rng(1).random((140, 150, 2), np.float32) / 2
     own = Subregions(("upper", "lower"), fades, (np.arange(60), np.arange(50, 134)))
     changed = replace(example_set, subregions=own)
-    write_examples(tmp_path / "set", changed)
+    save_examples(tmp_path / "set", changed)
     assert_same(load_examples(tmp_path / "set"), changed)
 
 
@@ -109,7 +109,7 @@ def test_subregions_that_are_none(
 ) -> None:
     fades = np.full((140, 150, 2), 0.5, np.float32)
     own = Subregions(("upper", "lower"), fades, (np.arange(60), np.arange(50, 134)))
-    write_examples(tmp_path / "set", replace(example_set, subregions=own))
+    save_examples(tmp_path / "set", replace(example_set, subregions=own))
     file = tmp_path / "set" / "subregions.npz"
     np.savez(file, **(dict(np.load(file)) | arrays))
     with pytest.raises(FileFormatError, match=r"subregions\.npz: .*" + message):
@@ -132,7 +132,7 @@ def test_an_older_folder_is_replaced_as_a_whole(folder: Path, example_set: Examp
     subregions = default_subregions(example_set.layout, example_set.neutral.points, (110, 130))
     only = example_set.examples[:1]
     alone = replace(example_set, examples=only, standard=0, teeth=(), subregions=subregions)
-    write_examples(folder, alone)
+    save_examples(folder, alone)
     assert sorted(path.name for path in (folder / "photos").iterdir()) == ["rest.png"]
     assert [path.name for path in folder.parent.iterdir()] == ["set"]
 
@@ -140,7 +140,7 @@ def test_an_older_folder_is_replaced_as_a_whole(folder: Path, example_set: Examp
 def test_other_things_are_not_replaced(tmp_path: Path, example_set: ExampleSet) -> None:
     (tmp_path / "letter.txt").write_text("dear")
     with pytest.raises(InputError, match="a folder with other things in it"):
-        write_examples(tmp_path, example_set)
+        save_examples(tmp_path, example_set)
     assert (tmp_path / "letter.txt").read_text() == "dear"
 
 
@@ -149,7 +149,7 @@ def test_a_set_that_cannot_be_written_leaves_the_old_one(
 ) -> None:
     bad = replace(example_set.examples[1], name="../joy")
     with pytest.raises(InputError, match=re.escape("a name that can be a file's, got '../joy'")):
-        write_examples(folder, replace(example_set, examples=(example_set.neutral, bad)))
+        save_examples(folder, replace(example_set, examples=(example_set.neutral, bad)))
     assert_same(load_examples(folder), example_set)
 
 
@@ -265,8 +265,10 @@ def test_statistics_that_are_no_archive(folder: Path) -> None:
 def test_the_documented_way_to_read_it(
     folder: Path, example_set: ExampleSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """docs/example-folder.md shows how to read the folder with numpy alone; it must be true."""
-    text = (Path(__file__).parents[3] / "docs" / "example-folder.md").read_text("utf-8")
+    """docs/reference/example-folder.md shows how to read the folder with numpy; it must be true."""
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "example-folder.md").read_text(
+        "utf-8"
+    )
     code = text.split("```python\n")[1].split("```")[0]
     folder.rename(folder.with_name("anna"))
     monkeypatch.chdir(folder.parent)
@@ -278,7 +280,9 @@ def test_the_documented_way_to_read_it(
 
 
 def test_the_documented_keys_are_those_written(folder: Path) -> None:
-    text = (Path(__file__).parents[3] / "docs" / "example-folder.md").read_text("utf-8")
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "example-folder.md").read_text(
+        "utf-8"
+    )
     shown = json.loads(text.split("```json\n")[1].split("```")[0])
     written = json.loads((folder / "examples.json").read_text())
     assert list(shown) == list(written)

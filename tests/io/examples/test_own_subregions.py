@@ -11,11 +11,11 @@ import pytest
 from mien.arrays import Array
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.assets.subregions import default_subregions
-from mien.io.examples.example_folder import load_examples, write_examples
+from mien.io.examples.example_folder import load_examples, save_examples
 from mien.synthesis.examples.example_set import Example, ExampleSet
 from mien.synthesis.synthesizer import Synthesizer
 
-PAGE = Path(__file__).parents[3] / "docs" / "feature-points.md"
+PAGE = Path(__file__).parents[3] / "docs" / "guide" / "subregions.md"
 SIZE = (160, 200)
 
 
@@ -44,7 +44,7 @@ def test_the_drawing_of_the_documentation_draws_and_mixes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, examples: ExampleSet
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    write_examples("anna-examples", examples)
+    save_examples("anna-examples", examples)
     (script,) = (
         block
         for block in re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)

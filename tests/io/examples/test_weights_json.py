@@ -11,7 +11,7 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
 from mien.errors import InputError
-from mien.io.examples.weights_json import write_weights
+from mien.io.examples.weights_json import save_weights
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
 
@@ -26,14 +26,12 @@ def example_set() -> ExampleSet:
     return ExampleSet(layout, examples, 0, np.stack([points] * 2), subregions)
 
 
-def test_shares_are_told_by_name_the_greatest_first(
-    tmp_path: Path, example_set: ExampleSet
-) -> None:
+def test_coefficients_are_by_name_largest_first(tmp_path: Path, example_set: ExampleSet) -> None:
     names = example_set.subregions.names
     shares = np.tile([0.25, 0.75, 0.0], (len(names), 1))
     shares[1] = [1 - 1e-5, 0, 1e-5]
     hull = np.arange(len(names)) / 7
-    write_weights(tmp_path / "W.json", example_set, shares, hull)
+    save_weights(tmp_path / "W.json", example_set, shares, hull)
     data = json.loads((tmp_path / "W.json").read_text())
     assert (data["format"], data["version"]) == ("mien weights", 1)
     assert data["examples"][1] == {"name": "joy", "source": "joy.jpg"}
@@ -46,5 +44,5 @@ def test_shares_are_told_by_name_the_greatest_first(
 def test_shares_of_other_examples_are_refused(tmp_path: Path, example_set: ExampleSet) -> None:
     count = len(example_set.subregions.names)
     with pytest.raises(InputError, match="coefficients: expected shape"):
-        write_weights(tmp_path / "W.json", example_set, np.ones((count, 2)), np.zeros(count))
+        save_weights(tmp_path / "W.json", example_set, np.ones((count, 2)), np.zeros(count))
     assert not (tmp_path / "W.json").exists()

@@ -12,7 +12,7 @@ import pytest
 
 from mien.io.files import leftovers
 from mien.io.files.atomic import atomic_file, atomic_folder
-from mien.io.files.leftovers import DAYS_OF_OTHERS, put_back, temporary_beside
+from mien.io.files.leftovers import FOREIGN_RUN_DAYS, finish_replacement, temporary_beside
 from mien.io.head.head_folder import load_head
 
 KILLED = """
@@ -70,7 +70,7 @@ def test_the_next_run_removes_what_a_killed_one_left(tmp_path: Path, moment: str
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no SIGKILL")
-def test_a_folder_moved_aside_by_a_killed_run_comes_back(tmp_path: Path) -> None:
+def test_a_folder_moved_aside_by_a_killed_run_round_trips(tmp_path: Path) -> None:
     place = tmp_path / "head"
     place.mkdir()
     (place / "head.json").write_text("old")
@@ -91,14 +91,14 @@ def test_of_two_the_one_in_place_counts(tmp_path: Path) -> None:
         folder.mkdir()
     (tmp_path / "head" / "new").write_text("")
     leftovers._own.clear()
-    put_back(tmp_path / "other")
+    finish_replacement(tmp_path / "other")
     assert aside.exists(), "another folder's"
-    put_back(tmp_path / "head")
+    finish_replacement(tmp_path / "head")
     assert names(tmp_path) == ["head"]
     assert names(tmp_path / "head") == ["new"]
 
 
-def test_what_lives_stays(tmp_path: Path) -> None:
+def test_temporary_files_of_running_processes_stay(tmp_path: Path) -> None:
     with atomic_file(tmp_path / "mine") as own:
         leftovers._cleaned.clear()
         # The parent process runs this test, so it is alive.
@@ -125,14 +125,14 @@ def test_of_other_machines_after_a_day(tmp_path: Path) -> None:
     new, old = (tmp_path / f".mien-{target}-00000000-{pid}-0000000{i}.tmp" for i in (1, 2))
     for path in (new, old):
         path.write_text("half")
-    past = time.time() - 1.1 * DAYS_OF_OTHERS * 86_400
+    past = time.time() - 1.1 * FOREIGN_RUN_DAYS * 86_400
     os.utime(old, (past, past))
     with atomic_file(tmp_path / "y"):
         assert new.exists()
         assert not old.exists()
 
 
-def test_files_of_like_names_are_none_of_ours(tmp_path: Path) -> None:
+def test_files_of_similar_names_stay(tmp_path: Path) -> None:
     others = [".mien-notes.tmp", ".mien-files.json", ".head.1a2b3c4d.tmp"]
     for name in others:
         (tmp_path / name).write_text("mine")

@@ -11,15 +11,15 @@ import pytest
 from mien.errors import InputError
 from mien.io.files import atomic
 from mien.io.files.atomic import atomic_folder, check_files_apart, check_side_file
-from mien.io.files.manifest import MANIFEST, kept_notes, own_files, read_manifest
+from mien.io.files.manifest import MANIFEST, kept_notes, load_manifest, user_files
 
 
 def always(folder: Path) -> bool:
     return True
 
 
-def write(folder: Path, files: Mapping[str, str], stay: tuple[str, ...] = ()) -> None:
-    with atomic_folder(folder, replaces=always, stay=stay) as place:
+def write(folder: Path, files: Mapping[str, str], editable: tuple[str, ...] = ()) -> None:
+    with atomic_folder(folder, replaces=always, editable=editable) as place:
         for name, text in files.items():
             (place / name).parent.mkdir(parents=True, exist_ok=True)
             (place / name).write_text(text)
@@ -37,10 +37,10 @@ def place(tmp_path: Path) -> Path:
 
 
 def test_all_of_a_new_folder_is_miens(place: Path) -> None:
-    manifest = read_manifest(place)
+    manifest = load_manifest(place)
     assert manifest is not None
     assert set(manifest.files) == {"a", "deep/b", "old"}
-    assert own_files(place) == []
+    assert user_files(place) == []
     assert kept_notes(place) == ()
 
 
@@ -181,7 +181,7 @@ def test_a_folder_with_the_name_of_the_list(place: Path) -> None:
     (place / MANIFEST).mkdir()
     (place / MANIFEST / "x").write_text("mine")
     write(place, {"a": "new", "deep/b": "new", "old": "new"})
-    assert read_manifest(place) is not None
+    assert load_manifest(place) is not None
     assert (place / "kept" / MANIFEST / "x").read_text() == "mine"
 
 
@@ -192,15 +192,15 @@ def test_empty_folders_stay(place: Path) -> None:
     assert not (place / "deep").exists()
 
 
-def test_what_people_are_meant_to_change_stays(place: Path) -> None:
+def test_editable_files_stay(place: Path) -> None:
     (place / "a").write_text("painted")
     for _ in range(2):
-        write(place, {"a": "1", "deep/b": "2"}, stay=("a",))
+        write(place, {"a": "1", "deep/b": "2"}, editable=("a",))
         assert contents(place) == {"a": "painted", "deep/b": "2"}
 
 
 @pytest.mark.parametrize("damage", ["", "{", '{"format": "x"}', '{"files": [1]}', "absent"])
-def test_without_a_list_nothing_counts_as_miens(place: Path, damage: str) -> None:
+def test_without_a_manifest_no_file_counts_as_miens(place: Path, damage: str) -> None:
     if damage == "absent":
         (place / MANIFEST).unlink()
     else:
@@ -228,7 +228,7 @@ def test_a_failure_leaves_all_as_it_was(place: Path) -> None:
     before = contents(place)
 
     def fail() -> None:
-        with atomic_folder(place, replaces=always, stay=()) as new:
+        with atomic_folder(place, replaces=always, editable=()) as new:
             (new / "a").write_text("half")
             raise RuntimeError
 

@@ -15,7 +15,7 @@ from documents import put
 from mien.errors import FileFormatError, InputError
 from mien.head import SHADING, Head
 from mien.io.head.head_folder import check_head_place, load_head, save_head
-from mien.io.head.head_json import VERSION
+from mien.io.head.head_json import HEAD_FORMAT
 
 JOY = ("expressions", "joy", "cameras", 0)
 
@@ -42,7 +42,7 @@ def saved(small_head: Head, tmp_path: Path) -> Path:
     return tmp_path / "head"
 
 
-def test_what_is_saved_comes_back(small_head: Head, saved: Path) -> None:
+def test_what_is_saved_round_trips(small_head: Head, saved: Path) -> None:
     loaded = load_head(saved)
     for name in ("subject", "unit_names", "left_out", "generator"):
         assert getattr(loaded, name) == getattr(small_head, name)
@@ -70,7 +70,7 @@ def expressive(head: Head) -> Head:
     return replace(head, expressions={**head.expressions, "joy": joy}, shading=shading)
 
 
-def test_what_expressions_are_made_of_comes_back(small_head: Head, tmp_path: Path) -> None:
+def test_what_expressions_are_made_of_round_trips(small_head: Head, tmp_path: Path) -> None:
     head = expressive(small_head)
     save_head(head, tmp_path / "h")
     loaded = load_head(tmp_path / "h")
@@ -103,7 +103,7 @@ def test_a_head_of_an_older_mien_loads(small_head: Head, tmp_path: Path) -> None
         np.testing.assert_array_equal(view.gains, np.ones(3))
 
 
-def test_cameras_come_back_to_the_last_bit(small_head: Head, saved: Path) -> None:
+def test_cameras_round_trip_to_the_last_bit(small_head: Head, saved: Path) -> None:
     for loaded, view in zip(load_head(saved).views, small_head.views, strict=True):
         for name in ("width", "height", "focal_px"):
             assert getattr(loaded.camera, name) == getattr(view.camera, name)
@@ -246,7 +246,9 @@ def test_a_folder_with_some_other_head_json_is_never_replaced(
 
 
 def test_a_newer_head_is_refused_and_says_so(saved: Path) -> None:
-    edit_json(saved, lambda data: data.update(version=VERSION + 1, generator="mien 9.0"))
+    edit_json(
+        saved, lambda data: data.update(version=HEAD_FORMAT.version + 1, generator="mien 9.0")
+    )
     with pytest.raises(FileFormatError, match=r"head\.json: version: 2 .*newer mien \(mien 9.0\)"):
         load_head(saved)
     check_head_place(saved)  # but it is a head folder, so that a new build may replace it
@@ -377,7 +379,7 @@ def test_a_wrong_entry_is_named(
         (put("textures", "atlas", to="textures/a\0.png"), "expected a path inside the folder"),
     ],
 )
-def test_what_was_once_accepted_silently_is_told(
+def test_values_that_no_head_has_raise(
     saved: Path, change: Callable[[dict[str, Any]], object], message: str
 ) -> None:
     edit_json(saved, change)
@@ -386,7 +388,7 @@ def test_what_was_once_accepted_silently_is_told(
     assert str(caught.value).startswith(str(saved))
 
 
-def test_deep_and_long_and_doubled_json_is_told(saved: Path, small_head: Head) -> None:
+def test_deep_and_long_and_doubled_json_raises(saved: Path, small_head: Head) -> None:
     """One reader reads it, whatever is to be done with it; what is no head's is not replaced."""
     path = saved / "head.json"
     for text, problem in (
@@ -444,7 +446,7 @@ def change_arrays(folder: Path, **changed: Any) -> None:
         ("uncertainty_mm", lambda a: a[:-1], "uncertainty_mm: expected shape"),
     ],
 )
-def test_arrays_that_no_head_has_are_told(
+def test_arrays_that_no_head_has_raise(
     saved: Path, name: str, change: Callable[[np.ndarray], np.ndarray], message: str
 ) -> None:
     with np.load(saved / "geometry.npz") as file:
@@ -504,8 +506,8 @@ def test_pickled_arrays_are_never_read(saved: Path) -> None:
 
 
 def test_the_documents_own_reader_works(saved: Path, small_head: Head) -> None:
-    """docs/head-folder.md shows how to read the folder with numpy alone; it must be true."""
-    text = (Path(__file__).parents[3] / "docs" / "head-folder.md").read_text("utf-8")
+    """docs/reference/head-folder.md shows how to read the folder with numpy; it must be true."""
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "head-folder.md").read_text("utf-8")
     program = text.split("```python\n")[1].split("```")[0]
     program = program.replace('open("HEAD/head.json", encoding="utf-8")', "opened")
     program = program.replace("HEAD", saved.as_posix())
@@ -520,7 +522,7 @@ def test_the_documents_own_reader_works(saved: Path, small_head: Head) -> None:
 
 
 def test_the_document_shows_every_key(saved: Path) -> None:
-    text = (Path(__file__).parents[3] / "docs" / "head-folder.md").read_text("utf-8")
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "head-folder.md").read_text("utf-8")
     shown = json.loads(text.split("```json\n")[1].split("```")[0])
     written = json.loads((saved / "head.json").read_text("utf-8"))
     assert list(shown) == list(written)

@@ -51,7 +51,7 @@ def raised(head: Head, region: str) -> Array:
     return (face.vertices - head.mesh.vertices)[SKIN, 1] / 10
 
 
-def test_masks_come_back(masked: Head, folder: Path) -> None:
+def test_masks_round_trip(masked: Head, folder: Path) -> None:
     found = load_head(folder).regions
     assert tuple(found) == MASKS
     off = np.abs([found[name] - masked.regions[name] for name in MASKS]).max(axis=0)

@@ -10,9 +10,9 @@ import pytest
 
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.errors import FileFormatError, InputError
-from mien.io.landmarks.points_file import read_points, write_points
-from mien.io.landmarks.points_json import read_points_json, write_points_json
-from mien.io.landmarks.pts import write_pts
+from mien.io.landmarks.points_file import load_feature_points, save_feature_points
+from mien.io.landmarks.points_json import load_points_json, save_points_json
+from mien.io.landmarks.pts import save_pts
 
 
 @pytest.fixture(scope="module")
@@ -20,15 +20,15 @@ def layout() -> FeatureLayout:
     return load_feature_layout()
 
 
-def test_points_come_back(tmp_path: Path, layout: FeatureLayout) -> None:
+def test_points_round_trip(tmp_path: Path, layout: FeatureLayout) -> None:
     path = tmp_path / "P.json"
     given = {"menton": np.array([10.25, 300.5]), "nose_tip": np.array([-1.0, 7.0])}
-    write_points_json(path, layout, given)
+    save_points_json(path, layout, given)
     assert json.loads(path.read_text()) == {
         "layout": layout.name,
         "points": {"menton": [10.25, 300.5], "nose_tip": [-1, 7]},
     }
-    found = read_points_json(path, layout)
+    found = load_points_json(path, layout)
     assert {name: point.tolist() for name, point in found.items()} == {
         "menton": [10.25, 300.5],
         "nose_tip": [-1, 7],
@@ -78,7 +78,7 @@ def test_what_is_refused(
     path = tmp_path / "P.json"
     path.write_text(json.dumps(document))
     with pytest.raises(FileFormatError, match=message) as caught:
-        read_points_json(path, layout)
+        load_points_json(path, layout)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
 
@@ -86,11 +86,11 @@ def test_what_is_refused(
 def test_what_is_not_written(tmp_path: Path, layout: FeatureLayout) -> None:
     path = tmp_path / "P.json"
     with pytest.raises(InputError, match="such as nose_tip"):
-        write_points_json(path, layout, {"nose_tipp": np.zeros(2)})
+        save_points_json(path, layout, {"nose_tipp": np.zeros(2)})
     with pytest.raises(InputError, match="menton: expected finite numbers"):
-        write_points_json(path, layout, {"menton": np.array([0, np.nan])})
+        save_points_json(path, layout, {"menton": np.array([0, np.nan])})
     with pytest.raises(InputError, match="points: expected at least one, got none"):
-        write_points_json(path, layout, {})
+        save_points_json(path, layout, {})
     assert not path.exists()
 
 
@@ -99,9 +99,9 @@ def test_files_of_all_kinds(
 ) -> None:
     points = np.round(rng.uniform(0, 500, (len(layout.names), 2)), 3)
     for name in ("a.json", "a.tem", "a.PTS"):
-        write_points(tmp_path / name, layout, points)
+        save_feature_points(tmp_path / name, layout, points)
     for name, count in (("a.json", len(points)), ("a.tem", len(points)), ("a.PTS", 27)):
-        known, positions = read_points(tmp_path / name, layout)
+        known, positions = load_feature_points(tmp_path / name, layout)
         assert len(known) == len(positions) >= count
         assert (np.diff(known) > 0).all()
         np.testing.assert_allclose(positions, points[known], atol=1e-3)
@@ -109,25 +109,25 @@ def test_files_of_all_kinds(
 
 def test_files_of_other_kinds(tmp_path: Path, layout: FeatureLayout) -> None:
     with pytest.raises(InputError, match=r"a.txt: expected a name that ends in .json, .tem, .pts"):
-        read_points(tmp_path / "a.txt", layout)
+        load_feature_points(tmp_path / "a.txt", layout)
     with pytest.raises(InputError, match=r"a.png: expected a name that ends in .json, .tem, .pts"):
-        write_points(tmp_path / "a.png", layout, np.zeros((len(layout.names), 2)))
+        save_feature_points(tmp_path / "a.png", layout, np.zeros((len(layout.names), 2)))
     with pytest.raises(InputError, match=r"none.json: expected a readable file"):
-        read_points(tmp_path / "none.json", layout)
-    write_pts(tmp_path / "a.pts", np.zeros((5, 2)))
+        load_feature_points(tmp_path / "none.json", layout)
+    save_pts(tmp_path / "a.pts", np.zeros((5, 2)))
     with pytest.raises(FileFormatError, match="expected iBUG's 68 points, found 5"):
-        read_points(tmp_path / "a.pts", layout)
+        load_feature_points(tmp_path / "a.pts", layout)
     (tmp_path / "a.tem").write_text("2\n1 2\n3 4\n")
     with pytest.raises(FileFormatError, match=r"expected 134 points \(zhang134\), 7 "):
-        read_points(tmp_path / "a.tem", layout)
+        load_feature_points(tmp_path / "a.tem", layout)
 
 
 def test_points_in_space(tmp_path: Path, layout: FeatureLayout) -> None:
     path = tmp_path / "P.json"
-    write_points_json(path, layout, {"menton": np.array([1.0, -120.5, 20.25])})
-    found = read_points_json(path, layout, axes=3)
+    save_points_json(path, layout, {"menton": np.array([1.0, -120.5, 20.25])})
+    found = load_points_json(path, layout, axes=3)
     assert found["menton"].tolist() == [1, -120.5, 20.25]
     with pytest.raises(FileFormatError, match=r"points\.menton: expected x and y, found 3 numbers"):
-        read_points_json(path, layout)
+        load_points_json(path, layout)
     with pytest.raises(InputError, match="two numbers for each, or three"):
-        write_points_json(path, layout, {"menton": np.zeros(3), "nose_tip": np.zeros(2)})
+        save_points_json(path, layout, {"menton": np.zeros(3), "nose_tip": np.zeros(2)})

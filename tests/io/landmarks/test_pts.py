@@ -11,10 +11,10 @@ from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.errors import FileFormatError, InputError
 from mien.io.landmarks.pts import (
     IBUG_SHARED,
+    load_pts,
     points_from_ibug,
     points_to_ibug,
-    read_pts,
-    write_pts,
+    save_pts,
 )
 
 HEAD = "version: 1\nn_points:  2\n{\n"
@@ -28,15 +28,15 @@ def layout() -> FeatureLayout:
 def test_the_first_pixels_centre_is_half_a_pixel_in(tmp_path: Path) -> None:
     path = tmp_path / "a.pts"
     path.write_text(HEAD + "1 1\n10.5 20.25\n}\n")
-    np.testing.assert_allclose(read_pts(path), [[0.5, 0.5], [10, 19.75]])
+    np.testing.assert_allclose(load_pts(path), [[0.5, 0.5], [10, 19.75]])
 
 
-def test_what_is_written_comes_back(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_what_is_written_round_trips(tmp_path: Path, rng: np.random.Generator) -> None:
     points = np.round(rng.uniform(-5, 900, (68, 2)), 3)
-    write_pts(tmp_path / "a.pts", points)
+    save_pts(tmp_path / "a.pts", points)
     text = (tmp_path / "a.pts").read_text()
     assert text.startswith("version: 1\nn_points: 68\n{\n")
-    np.testing.assert_allclose(read_pts(tmp_path / "a.pts"), points, atol=1e-9)
+    np.testing.assert_allclose(load_pts(tmp_path / "a.pts"), points, atol=1e-9)
 
 
 def test_shared_points_make_the_round_trip(layout: FeatureLayout, rng: np.random.Generator) -> None:
@@ -76,23 +76,23 @@ def test_the_68_points_of_a_symmetric_face_are_symmetric(layout: FeatureLayout) 
         ("version: 1\nn_points: 0\n{\n}\n", "n_points says 0, found 0 points"),
     ],
 )
-def test_bad_files_are_told(tmp_path: Path, text: str, message: str) -> None:
+def test_bad_files_raise(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "bad.pts"
     path.write_text(text)
     with pytest.raises(FileFormatError, match=message) as raised:
-        read_pts(path)
+        load_pts(path)
     assert str(raised.value).startswith(str(path))
 
 
-def test_bad_values_are_told(tmp_path: Path, layout: FeatureLayout) -> None:
+def test_bad_values_raise(tmp_path: Path, layout: FeatureLayout) -> None:
     with pytest.raises(InputError, match="points: expected finite"):
-        write_pts(tmp_path / "a.pts", np.full((68, 2), np.inf))
+        save_pts(tmp_path / "a.pts", np.full((68, 2), np.inf))
     with pytest.raises(InputError, match=r"points: expected shape \(68, 2\)"):
         points_from_ibug(np.zeros((49, 2)), layout)
     with pytest.raises(InputError, match=r"points: expected shape \(134, 2\)"):
         points_to_ibug(layout, np.zeros((68, 2)))
     with pytest.raises(InputError, match="a readable file"):
-        read_pts(tmp_path / "none.pts")
+        load_pts(tmp_path / "none.pts")
 
 
 @pytest.mark.parametrize(
@@ -105,11 +105,11 @@ def test_bad_values_are_told(tmp_path: Path, layout: FeatureLayout) -> None:
 )
 def test_files_of_other_programs_read(tmp_path: Path, text: str) -> None:
     (tmp_path / "a.pts").write_bytes(text.encode())
-    np.testing.assert_allclose(read_pts(tmp_path / "a.pts"), [[0.5, 0.5], [10, 19.75]])
+    np.testing.assert_allclose(load_pts(tmp_path / "a.pts"), [[0.5, 0.5], [10, 19.75]])
 
 
 @pytest.mark.parametrize("version", ["2", "1.1", "10", "1.0.0"])
-def test_other_versions_are_told(tmp_path: Path, version: str) -> None:
+def test_other_versions_raise(tmp_path: Path, version: str) -> None:
     (tmp_path / "a.pts").write_text(HEAD.replace("1", version) + "1 1\n2 2\n}\n")
     with pytest.raises(FileFormatError, match="expected 'version: 1', 'n_points: 68' and"):
-        read_pts(tmp_path / "a.pts")
+        load_pts(tmp_path / "a.pts")

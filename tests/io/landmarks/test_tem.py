@@ -14,10 +14,10 @@ from mien.io.landmarks.pts import points_to_ibug
 from mien.io.landmarks.tem import (
     Delineation,
     TemLine,
+    load_tem,
     points_from_tem,
     points_to_tem,
-    read_tem,
-    write_tem,
+    save_tem,
 )
 from mien.io.landmarks.tem_templates import TEMPLATES
 
@@ -27,7 +27,7 @@ SMALL = "3\n1.5\t2\n3 4\n5\t6\n2\n0\n2\n0 1\n1\n4\n0 1 2 0\n"
 def test_reads_points_and_lines(tmp_path: Path) -> None:
     path = tmp_path / "a.tem"
     path.write_text(SMALL)
-    found = read_tem(path)
+    found = load_tem(path)
     np.testing.assert_array_equal(found.points, [[1.5, 2], [3, 4], [5, 6]])
     assert [(line.closed, line.points.tolist()) for line in found.lines] == [
         (False, [0, 1]),
@@ -37,16 +37,16 @@ def test_reads_points_and_lines(tmp_path: Path) -> None:
 
 def test_a_file_without_lines_and_with_other_ends_of_line_reads(tmp_path: Path) -> None:
     (tmp_path / "a.tem").write_bytes(b"\xef\xbb\xbf1\r\n7\t8\r\n")
-    found = read_tem(tmp_path / "a.tem")
+    found = load_tem(tmp_path / "a.tem")
     np.testing.assert_array_equal(found.points, [[7, 8]])
     assert found.lines == ()
 
 
-def test_a_layouts_points_come_back(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_a_layouts_points_round_trip(tmp_path: Path, rng: np.random.Generator) -> None:
     layout = load_feature_layout()
     points = np.round(rng.uniform(0, 900, (134, 2)), 3)
-    write_tem(tmp_path / "a.tem", points_to_tem(layout, points))
-    found = read_tem(tmp_path / "a.tem")
+    save_tem(tmp_path / "a.tem", points_to_tem(layout, points))
+    found = load_tem(tmp_path / "a.tem")
     named = points_from_tem(found, layout)
     assert list(named) == list(layout.names)
     np.testing.assert_allclose(np.array(list(named.values())), points, atol=1e-9)
@@ -69,32 +69,32 @@ def test_a_layouts_points_come_back(tmp_path: Path, rng: np.random.Generator) ->
         ("3\n1 2\n3 4\n5 6\n1\n0\n2\n0\n", "ends before a line's point"),
     ],
 )
-def test_bad_files_are_told(tmp_path: Path, text: str, message: str) -> None:
+def test_bad_files_raise(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "bad.tem"
     path.write_text(text)
     with pytest.raises(FileFormatError, match=message) as raised:
-        read_tem(path)
+        load_tem(path)
     assert str(raised.value).startswith(str(path))
 
 
-def test_other_bytes_and_no_file_are_told(tmp_path: Path) -> None:
+def test_other_bytes_and_no_file_raise(tmp_path: Path) -> None:
     (tmp_path / "bad.tem").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(FileFormatError, match="found other bytes"):
-        read_tem(tmp_path / "bad.tem")
+        load_tem(tmp_path / "bad.tem")
     with pytest.raises(InputError, match="a readable file"):
-        read_tem(tmp_path / "none.tem")
+        load_tem(tmp_path / "none.tem")
 
 
 def test_bad_values_are_not_written(tmp_path: Path) -> None:
     path = tmp_path / "a.tem"
     with pytest.raises(InputError, match="points: expected finite"):
-        write_tem(path, Delineation(np.full((2, 2), np.nan), ()))
+        save_tem(path, Delineation(np.full((2, 2), np.nan), ()))
     with pytest.raises(InputError, match="lines: expected points from 0 to 1"):
-        write_tem(path, Delineation(np.zeros((2, 2)), (TemLine(False, np.array([0, 2])),)))
+        save_tem(path, Delineation(np.zeros((2, 2)), (TemLine(False, np.array([0, 2])),)))
     assert not path.exists()
 
 
-def test_another_template_is_told() -> None:
+def test_another_template_raises() -> None:
     delineation = Delineation(np.zeros((71, 2)), ())
     with pytest.raises(OtherPointsError) as raised:
         points_from_tem(delineation, load_feature_layout(), "a.tem")
@@ -117,7 +117,7 @@ def test_templates_name_points_of_the_layout_on_both_sides(count: int) -> None:
 )
 def test_real_templates_lie_where_their_names_say(shared: Path, name: str) -> None:
     layout = load_feature_layout()
-    named = points_from_tem(read_tem(shared / "data" / f"{name}.tem"), layout)
+    named = points_from_tem(load_tem(shared / "data" / f"{name}.tem"), layout)
     width = named["left_eye_outer"][0] - named["right_eye_outer"][0]
     assert width > 0
     for side in ("right", "left"):
@@ -163,7 +163,7 @@ def test_dlibs_five_points() -> None:
 def test_the_70_points_of_the_case_are_a_face(shared: Path) -> None:
     layout = load_feature_layout()
     path = shared / "data" / "cases" / "dlib70_tem" / "dlib70.tem"
-    found = points_from_tem(read_tem(path), layout, path)
+    found = points_from_tem(load_tem(path), layout, path)
     assert found["right_pupil"][0] < found["nose_tip"][0] < found["left_pupil"][0]
     assert found["nose_tip"][1] < found["upper_lip_outer"][1] < found["menton"][1]
     for side in ("right", "left"):

@@ -11,7 +11,7 @@ import pytest
 from mien.animate.channels import head_rotation
 from mien.animate.timeline import Moment
 from mien.errors import InputError
-from mien.io.live.live_link import EYE_COLUMNS, HEAD_COLUMNS, UNITS, values_of
+from mien.io.live.live_link import EYE_COLUMNS, HEAD_COLUMNS, UNITS, live_link_values
 from mien.io.live.live_link_udp import NAMES, Packet, decode, encode
 from mien.rig.state import FaceState, Gaze
 from packets import UNREAL, as_unreal_reads
@@ -54,7 +54,7 @@ def test_units_go_from_0_to_1_and_angles_where_they_will() -> None:
 def test_a_moment_has_the_recordings_angles() -> None:
     turned = head_rotation(0.3, 0, 0) @ head_rotation(0, -0.2, 0) @ head_rotation(0, 0, 0.1)
     moment = Moment(0.0, FaceState(gaze=Gaze(0.2, 0.1)), turned, np.zeros(3))
-    values = values_of(moment, {"jawOpen": 0.5})
+    values = live_link_values(moment, {"jawOpen": 0.5})
     _, _, _, found = as_unreal_reads(encode(packet(**values)))
     assert found["jawOpen"] == 0.5
     assert [found[name] for name in HEAD_COLUMNS] == pytest.approx([-0.3, -0.2, -0.1])
@@ -65,7 +65,7 @@ def test_a_moment_has_the_recordings_angles() -> None:
 
 @pytest.mark.parametrize("seconds", [0.0, 1 / 120, 59.99999, 86399.999])
 @pytest.mark.parametrize("subject", ["a", "Zoë", "x" * 255])
-def test_a_packet_comes_back(subject: str, seconds: float) -> None:
+def test_a_packet_round_trips(subject: str, seconds: float) -> None:
     sent = packet(subject, seconds, tongueOut=0.125, HeadYaw=-1.5)
     back = decode(encode(sent))
     assert (back.subject, back.values) == (subject, sent.values)

@@ -65,7 +65,7 @@ def test_an_error_leaves_the_old_file(small_head: Head, tmp_path: Path) -> None:
 class TestGenericHead:
     """The head that ships, whole: what every user's export looks like."""
 
-    def test_the_khronos_validator_has_nothing_to_say(
+    def test_the_khronos_validator_finds_nothing(
         self, generic: Head, tmp_path: Path, gltf_remarks: Callable[[Path], list[str]]
     ) -> None:
         export_head(generic, tmp_path / "head.glb")

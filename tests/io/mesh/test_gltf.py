@@ -17,7 +17,7 @@ from mien.io.mesh.gltf import glb_bytes, save_glb
 
 @pytest.mark.parametrize("lit", [True, False])
 @pytest.mark.parametrize("image", ["JPEG", "PNG"])
-def test_the_khronos_validator_has_nothing_to_say(
+def test_the_khronos_validator_finds_nothing(
     small_head: Head,
     tmp_path: Path,
     gltf_remarks: Callable[[Path], list[str]],

@@ -26,7 +26,7 @@ def channels(glb: Glb) -> dict[str, dict[str, Any]]:
     }
 
 
-def test_the_khronos_validator_has_nothing_to_say(
+def test_the_khronos_validator_finds_nothing(
     small_head: Head,
     nod: HeadAnimation,
     tmp_path: Path,

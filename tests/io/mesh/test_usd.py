@@ -157,7 +157,7 @@ def test_it_moves(small_head: Head, nod: HeadAnimation, tmp_path: Path) -> None:
         np.testing.assert_allclose(MM * place[:3, 3], nod.translations_mm[index], atol=1e-5)
 
 
-def test_names_that_usd_cannot_use_stay_apart(small_head: Head, tmp_path: Path) -> None:
+def test_names_that_usd_cannot_use_stay_distinct(small_head: Head, tmp_path: Path) -> None:
     joy = small_head.expressions["joy"]
     head = replace(
         small_head, expressions=small_head.expressions | {"very sad": joy, "very-sad": joy}

@@ -10,7 +10,7 @@ import pytest
 from mien.animate.channels import head_rotation
 from mien.assets.generic import load_generic_head
 from mien.errors import EstimationError, InputError
-from mien.io.timeline.fap import FapMeter, measure_fapu, write_fap
+from mien.io.timeline.fap import FapMeter, measure_fapu, save_fap
 from mien.io.timeline.fap_table import COUNT, MEASURED, PARAMETERS
 
 HEAD = load_generic_head()
@@ -122,7 +122,7 @@ def test_head_and_eyes_turn_by_their_angles() -> None:
 def test_the_file_says_what_it_holds(tmp_path: Path) -> None:
     meter = FapMeter.of(NEUTRAL)
     frames = [meter.read(unit("jawOpen", weight)) for weight in (0.0, 0.5, 1.0)]
-    assert write_fap(tmp_path / "my take.fap", iter(frames), 25) == 3
+    assert save_fap(tmp_path / "my take.fap", iter(frames), 25) == 3
     lines = (tmp_path / "my take.fap").read_text().splitlines()
     assert lines[0] == "2.1 my_take 25 3"
     assert len(lines) == 7
@@ -138,9 +138,9 @@ def test_the_file_says_what_it_holds(tmp_path: Path) -> None:
 
 def test_bad_input_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"a.fap: expected a whole number.*got 29.97"):
-        write_fap(tmp_path / "a.fap", [np.zeros(68)], 29.97)
+        save_fap(tmp_path / "a.fap", [np.zeros(68)], 29.97)
     with pytest.raises(InputError, match="at least one frame to write"):
-        write_fap(tmp_path / "a.fap", [], 25)
+        save_fap(tmp_path / "a.fap", [], 25)
     with pytest.raises(InputError, match=r"neutral: expected shape"):
         FapMeter.of(np.zeros((4, 3)))
     with pytest.raises(EstimationError, match=r"IRISD0 = 0.00 mm"):

@@ -13,8 +13,8 @@ from mien.animate.curves import Curve, constant
 from mien.animate.layers import Blink, Breathing
 from mien.animate.timeline import Clip, Layer, Placement, Timeline
 from mien.errors import FileFormatError, InputError
-from mien.io.timeline.timeline_check import check_timeline
-from mien.io.timeline.timeline_json import load_timeline, save_timeline
+from mien.io.timeline.timeline_file import check_timeline
+from mien.io.timeline.timeline_json import load_timeline_json, save_timeline
 
 MIXED = Curve(
     [0.0, 0.5, 1.25, 3.0],
@@ -49,9 +49,9 @@ FULL = Timeline(
 )
 
 
-def test_a_timeline_comes_back(tmp_path: Path) -> None:
+def test_a_timeline_round_trips(tmp_path: Path) -> None:
     save_timeline(tmp_path / "a.json", FULL)
-    loaded = load_timeline(tmp_path / "a.json")
+    loaded = load_timeline_json(tmp_path / "a.json")
     times = np.linspace(-1, 5, 301)
     expected, found = FULL.sample(times), loaded.sample(times)
     assert found.keys() == expected.keys()
@@ -73,7 +73,7 @@ def test_a_document_reads_well(tmp_path: Path) -> None:
 
 def test_angles_are_degrees_in_the_file(tmp_path: Path) -> None:
     path = write(tmp_path, tracks={"head": {"yaw": 30}, "gaze": {"pitch": [[0, 0], [1, -10]]}})
-    found = load_timeline(path).sample([1.0])
+    found = load_timeline_json(path).sample([1.0])
     assert found["head.yaw"][0] == pytest.approx(np.radians(30))
     assert found["gaze.pitch"][0] == pytest.approx(np.radians(-10))
 
@@ -171,7 +171,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
 def test_mistakes_are_named_with_their_place(tmp_path: Path, changes: dict, message: str) -> None:
     path = write(tmp_path, **changes)
     with pytest.raises(FileFormatError) as caught:
-        load_timeline(path)
+        load_timeline_json(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -192,13 +192,13 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes, message: str) -
     path = tmp_path / "timeline.json"
     path.write_bytes(content)
     with pytest.raises(FileFormatError) as caught:
-        load_timeline(path)
+        load_timeline_json(path)
     assert message in str(caught.value)
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"nothing\.json: expected a readable file"):
-        load_timeline(tmp_path / "nothing.json")
+        load_timeline_json(tmp_path / "nothing.json")
 
 
 def test_a_head_must_have_what_a_timeline_moves() -> None:

@@ -21,7 +21,7 @@ from mien.io.tracks.openface_csv import (
     action_units,
     gaze_vectors,
     pose_angles,
-    write_openface,
+    save_openface,
 )
 from mien.pipelines.explained import units_of
 from mien.rig.gaze import LOOK_UNITS
@@ -45,7 +45,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 def test_columns_and_rows(tmp_path: Path, rng: np.random.Generator) -> None:
     track = random_track(rng)
-    assert write_openface(tmp_path / "a.csv", track) == 9
+    assert save_openface(tmp_path / "a.csv", track) == 9
     assert (tmp_path / "a.csv").read_text().splitlines()[0] == HEADER
     rows = rows_of(tmp_path / "a.csv")
     for number, (row, frame) in enumerate(zip(rows, track.frames, strict=True), 1):
@@ -94,7 +94,7 @@ def test_gaze_angles_grow_to_the_pictures_right_and_down(
 ) -> None:
     looks = ((0.2, 0.0), (0.0, -0.1))
     states = [replace(random_state(rng), R_cam_head=FACING, gaze=np.array(look)) for look in looks]
-    write_openface(tmp_path / "a.csv", track_of(states, rng))
+    save_openface(tmp_path / "a.csv", track_of(states, rng))
     left, down = rows_of(tmp_path / "a.csv")
     assert float(left["gaze_angle_x"]) == pytest.approx(0.2, abs=1e-6)
     assert float(left["gaze_angle_y"]) == 0
@@ -129,7 +129,7 @@ def test_lips_part_with_the_jaw_unless_they_are_held_together() -> None:
 
 def test_presence_starts_at_a_trace(tmp_path: Path, rng: np.random.Generator) -> None:
     states = [replace(random_state(rng), units=np.array([jaw, 0.0])) for jaw in (0.19, 0.21)]
-    write_openface(tmp_path / "a.csv", track_of(states, rng))
+    save_openface(tmp_path / "a.csv", track_of(states, rng))
     assert [row["AU26_c"] for row in rows_of(tmp_path / "a.csv")] == ["0", "1"]
 
 
@@ -149,17 +149,17 @@ def test_photographed_expressions_count_by_their_units(
     layout = Layout(("mouth",), ("neutral", "joy"))
     state = replace(random_state(rng, layout), weights=np.array([[0.5, 0.5]]))
     track = track_of([state], rng, layout=layout)
-    write_openface(tmp_path / "a.csv", track, units_of=lambda state: units_of(head, state))
+    save_openface(tmp_path / "a.csv", track, units_of=lambda state: units_of(head, state))
     assert float(rows_of(tmp_path / "a.csv")[0]["AU12_r"]) == pytest.approx(2.0)
 
 
 def test_an_empty_track_is_refused(tmp_path: Path, rng: np.random.Generator) -> None:
     with pytest.raises(InputError, match="at least one frame to write"):
-        write_openface(tmp_path / "a.csv", track_of([], rng, layout=LAYOUT))
+        save_openface(tmp_path / "a.csv", track_of([], rng, layout=LAYOUT))
     assert not list(tmp_path.iterdir())
 
 
 def test_the_docs_table_is_the_codes() -> None:
-    page = Path(__file__).parents[3] / "docs" / "track-files.md"
+    page = Path(__file__).parents[3] / "docs" / "reference" / "track-files.md"
     rows = re.findall(r"^\| (AU\d\d) \|.*\| ([\w, ]+?)(?:;.*)? \|$", page.read_text(), re.MULTILINE)
     assert {name: tuple(units.split(", ")) for name, units in rows} == dict(ACTION_UNITS)

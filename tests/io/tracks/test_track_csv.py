@@ -16,7 +16,7 @@ from mien.io.tracks.track_csv import (
     columns_of,
     is_track,
     load_track,
-    write_track,
+    save_track,
 )
 from mien.track.state import Layout, Track, TrackedFrame, TrackState
 from tracks import LAYOUT, frame_of, random_state, random_track, track_of
@@ -37,9 +37,9 @@ def assert_same_frame(found: TrackedFrame, given: TrackedFrame, tolerance: float
 
 
 @pytest.mark.parametrize("layout", [LAYOUT, NEUTRAL_ONLY, BARE], ids=["all", "neutral", "bare"])
-def test_a_track_comes_back(tmp_path: Path, rng: np.random.Generator, layout: Layout) -> None:
+def test_a_track_round_trips(tmp_path: Path, rng: np.random.Generator, layout: Layout) -> None:
     track = random_track(rng, layout=layout)
-    write_track(tmp_path / "TRACK.csv", track)
+    save_track(tmp_path / "TRACK.csv", track)
     found = load_track(tmp_path / "TRACK.csv")
     assert replace(found, frames=()) == replace(track, frames=())
     for frame, given in zip(found.frames, track.frames, strict=True):
@@ -48,7 +48,7 @@ def test_a_track_comes_back(tmp_path: Path, rng: np.random.Generator, layout: La
 
 def test_columns_are_those_of_the_design(tmp_path: Path, rng: np.random.Generator) -> None:
     track = random_track(rng)
-    write_track(tmp_path / "a.csv", track)
+    save_track(tmp_path / "a.csv", track)
     with (tmp_path / "a.csv").open() as file:
         rows = list(csv.DictReader(file))
     names = list(rows[0])
@@ -73,7 +73,7 @@ def test_rotation_vectors_go_on_smoothly_past_a_half_turn(
     nods = [
         replace(state, R_cam_head=_about_x(angle)) for angle in np.pi + np.linspace(-0.3, 0.3, 9)
     ]
-    write_track(tmp_path / "a.csv", track_of(nods, rng))
+    save_track(tmp_path / "a.csv", track_of(nods, rng))
     with (tmp_path / "a.csv").open() as file:
         rx = [float(row["rx"]) for row in csv.DictReader(file)]
     np.testing.assert_allclose(rx, np.pi + np.linspace(-0.3, 0.3, 9), atol=1e-9)
@@ -87,19 +87,19 @@ def _about_x(angle: float) -> np.ndarray:
 def test_what_is_not_finite_is_an_empty_cell(tmp_path: Path, rng: np.random.Generator) -> None:
     frame = frame_of(0, 0.0, random_state(rng), rng)
     frame.deviations[3] = np.inf
-    write_track(tmp_path / "a.csv", Track(LAYOUT, 8, 8, 9.0, 25.0, (frame,)))
+    save_track(tmp_path / "a.csv", Track(LAYOUT, 8, 8, 9.0, 25.0, (frame,)))
     found = load_track(tmp_path / "a.csv").frames[0].deviations
     assert np.flatnonzero(np.isnan(found)).tolist() == [3]
 
 
-def test_a_track_without_frames_comes_back(tmp_path: Path) -> None:
+def test_a_track_without_frames_round_trips(tmp_path: Path) -> None:
     track = Track(LAYOUT, 8, 8, 9.0, 25.0, ())
-    write_track(tmp_path / "a.csv", track)
+    save_track(tmp_path / "a.csv", track)
     assert load_track(tmp_path / "a.csv") == track
 
 
 def written(tmp_path: Path, rng: np.random.Generator) -> Path:
-    write_track(tmp_path / "a.csv", random_track(rng))
+    save_track(tmp_path / "a.csv", random_track(rng))
     return tmp_path / "a.csv"
 
 
@@ -170,7 +170,7 @@ BAD_SIDECARS = [
 
 
 @pytest.mark.parametrize(("change", "message"), BAD_SIDECARS)
-def test_bad_sidecars_are_told_in_one_line(
+def test_bad_sidecars_raise_one_line_errors(
     tmp_path: Path, rng: np.random.Generator, change: dict, message: str
 ) -> None:
     path = written(tmp_path, rng)
@@ -192,7 +192,7 @@ def test_another_file_of_the_sidecars_name_is_kept(
     tmp_path: Path, rng: np.random.Generator
 ) -> None:
     (tmp_path / "a.json").write_text('{"format": "mien timeline"}')
-    for check in (check_track_place, lambda path: write_track(path, random_track(rng))):
+    for check in (check_track_place, lambda path: save_track(path, random_track(rng))):
         with pytest.raises(InputError, match=r"a\.json: expected no file of this name"):
             check(tmp_path / "a.csv")
     assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
@@ -202,7 +202,7 @@ def test_another_file_of_the_sidecars_name_is_kept(
     check_track_place(tmp_path / "older" / "a.csv")
 
 
-def test_tracks_are_told_by_their_first_line(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_tracks_are_known_by_their_first_line(tmp_path: Path, rng: np.random.Generator) -> None:
     assert is_track(written(tmp_path, rng))
     (tmp_path / "b.csv").write_text("Timecode,BlendShapeCount\n")
     assert not is_track(tmp_path / "b.csv")
@@ -212,5 +212,5 @@ def test_tracks_are_told_by_their_first_line(tmp_path: Path, rng: np.random.Gene
 def test_frames_of_another_layout_are_refused(tmp_path: Path, rng: np.random.Generator) -> None:
     frame = replace(frame_of(0, 0.0, random_state(rng), rng), deviations=np.zeros(3))
     with pytest.raises(InputError, match=r"deviations: expected shape \(10\)"):
-        write_track(tmp_path / "a.csv", Track(LAYOUT, 8, 8, 9.0, 25.0, (frame,)))
+        save_track(tmp_path / "a.csv", Track(LAYOUT, 8, 8, 9.0, 25.0, (frame,)))
     assert not list(tmp_path.iterdir())

@@ -47,7 +47,7 @@ def kept(path: Path, frames: list[TrackedFrame]) -> Path:
     return path
 
 
-def test_frames_come_back_bit_for_bit(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_frames_round_trip_bit_for_bit(tmp_path: Path, rng: np.random.Generator) -> None:
     frames = frames_of(rng)
     found = load_journal(kept(tmp_path / "a.csv.part", frames), HEADER, LAYOUT)
     for frame, given in zip(found, frames, strict=True):
@@ -123,7 +123,7 @@ def test_another_runs_journal_is_refused(tmp_path: Path, change: dict, message: 
     assert message in str(caught.value)
 
 
-def test_bad_files_are_told_in_one_line(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_bad_files_raise_one_line_errors(tmp_path: Path, rng: np.random.Generator) -> None:
     path = tmp_path / "a.part"
     with pytest.raises(InputError, match="expected a readable file"):
         load_journal(path, HEADER, LAYOUT)

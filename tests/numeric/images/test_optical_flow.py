@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from mien.numeric.images.optical_flow import local_correlation, match_images, normalize_contrast
+from mien.numeric.images.optical_flow import local_correlation, normalize_contrast, optical_flow
 
 EVERYWHERE = np.ones((160, 200), bool)
 
@@ -27,7 +27,7 @@ def test_a_known_field_is_found_to_a_tenth_of_a_pixel() -> None:
     moved = shifted(image, field)
     a, b = (normalize_contrast(item, EVERYWHERE, 12) for item in (moved, image))
     # What the moved image shows at a pixel is found `field` further in the first.
-    miss = np.linalg.norm(match_images(a, b) - field, axis=-1)[15:-15, 15:-15]
+    miss = np.linalg.norm(optical_flow(a, b) - field, axis=-1)[15:-15, 15:-15]
     assert np.median(miss) < 0.1
 
 
@@ -60,10 +60,10 @@ def test_correlation_of_the_same_and_of_others() -> None:
 def test_flat_images_are_no_error() -> None:
     flat = normalize_contrast(np.full((160, 200), 90, np.float32), EVERYWHERE, 10)
     assert np.abs(flat).max() < 1e-3
-    assert np.isfinite(match_images(flat, flat)).all()
+    assert np.isfinite(optical_flow(flat, flat)).all()
     assert np.isfinite(local_correlation(flat, flat)).all()
 
 
 def test_the_same_each_time() -> None:
     a, b = (normalize_contrast(pattern(seed), EVERYWHERE, 10) for seed in (0, 1))
-    np.testing.assert_array_equal(match_images(a, b), match_images(a, b))
+    np.testing.assert_array_equal(optical_flow(a, b), optical_flow(a, b))

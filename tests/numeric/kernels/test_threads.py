@@ -7,7 +7,7 @@ import numba
 import numpy as np
 import pytest
 
-from mien.numeric.kernels.threads import for_row_bands, side_by_side
+from mien.numeric.kernels.threads import for_row_bands, run_concurrently
 
 
 @pytest.fixture(params=[1, 2])
@@ -32,7 +32,7 @@ def test_results_come_in_the_tasks_order(threads: int) -> None:
         first_may_end.set()
         return "second"
 
-    assert side_by_side(first, second) == ["first", "second"]
+    assert run_concurrently(first, second) == ["first", "second"]
 
 
 def test_a_tasks_error_is_the_callers(threads: int) -> None:
@@ -40,7 +40,7 @@ def test_a_tasks_error_is_the_callers(threads: int) -> None:
         raise ValueError("broken")
 
     with pytest.raises(ValueError, match="broken"):
-        side_by_side(lambda: 1, fail)
+        run_concurrently(lambda: 1, fail)
 
 
 def test_tasks_may_share_rows_out(threads: int) -> None:
@@ -55,5 +55,5 @@ def test_tasks_may_share_rows_out(threads: int) -> None:
         for_row_bands(band, len(out), work=10**6)
         return out
 
-    for found in side_by_side(*[squares] * 8):
+    for found in run_concurrently(*[squares] * 8):
         np.testing.assert_array_equal(found, np.arange(1000) ** 2)

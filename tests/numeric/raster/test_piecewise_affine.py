@@ -10,10 +10,10 @@ from mien.errors import InputError
 from mien.numeric.raster.piecewise_affine import (
     SUBPIXELS,
     affine_maps,
-    cut_row,
-    extents,
-    facing,
-    snapped,
+    orient_triangles,
+    row_extents,
+    scanline_spans,
+    to_subpixels,
 )
 
 WIDTH, HEIGHT = 60, 40
@@ -37,14 +37,14 @@ def triangles(points):
 
 def owners(points, triangles):
     """Each pixel's triangle."""
-    corners = snapped(points)
+    corners = to_subpixels(points)
     drawn = np.empty((HEIGHT, WIDTH), np.int32)
     count = len(triangles)
     found = np.empty((count, 3), np.int64)
     starts, spans = np.empty(2 * count + 2, np.int64), np.empty(2 * count + 1, np.int64)
-    tops, ends = extents(corners, triangles)
+    tops, ends = row_extents(corners, triangles)
     for row in range(HEIGHT):
-        count = cut_row(corners, triangles, tops, ends, row, WIDTH, found, starts, spans)
+        count = scanline_spans(corners, triangles, tops, ends, row, WIDTH, found, starts, spans)
         assert starts[0] == 0
         assert starts[count] == WIDTH
         drawn[row] = np.repeat(spans[:count], np.diff(starts[: count + 1]))
@@ -64,7 +64,7 @@ def centres():
 @pytest.mark.parametrize("seed", range(5))
 def test_triangles_that_share_edges_share_no_pixel_and_leave_none(points, triangles, seed):
     """Those that face less those that are folded over: the border's winding number, everywhere."""
-    faces = facing(triangles, points)
+    faces = orient_triangles(triangles, points)
     moved = points.copy()
     # In coarse steps too: many corners and edges fall on the centres of pixels.
     step = np.random.default_rng(seed).normal(0, 0.3, points[4:].shape)
@@ -82,20 +82,20 @@ def signed_areas(points, triangles):
 
 
 def test_no_pixel_is_drawn_twice_where_nothing_folds(points, triangles):
-    assert (covered(points, facing(triangles, points)) == 1).all()
+    assert (covered(points, orient_triangles(triangles, points)) == 1).all()
 
 
 def test_however_inner_points_move_all_is_covered(points, triangles):
     """What folds over is not drawn; what lies over it is."""
     moved = points.copy()
     moved[4:] = np.random.default_rng(1).uniform(0, 40, points[4:].shape)
-    faces = facing(triangles, points)
+    faces = orient_triangles(triangles, points)
     assert (signed_areas(moved, faces) < 0).any()
     assert (covered(moved, faces) >= 1).all()
 
 
 def test_a_pixel_is_of_the_triangle_that_holds_its_centre(points, triangles):
-    faces = facing(triangles, points)
+    faces = orient_triangles(triangles, points)
     drawn = owners(points, faces)
     a, b, c = np.moveaxis(points[faces[drawn]], 2, 0)
     for p, q in ((a, b), (b, c), (c, a)):
@@ -103,12 +103,12 @@ def test_a_pixel_is_of_the_triangle_that_holds_its_centre(points, triangles):
 
 
 def test_triangles_may_go_either_way_around(points, triangles):
-    there, back = facing(triangles, points), facing(triangles[:, ::-1], points)
+    there, back = orient_triangles(triangles, points), orient_triangles(triangles[:, ::-1], points)
     np.testing.assert_array_equal(owners(points, there), owners(points, back))
 
 
 def test_an_affine_motion_of_all_points_is_that_of_every_pixel(points, triangles):
-    faces, corners = facing(triangles, points), snapped(points)
+    faces, corners = orient_triangles(triangles, points), to_subpixels(points)
     at = corners / SUBPIXELS
     maps = affine_maps(corners, faces, np.stack([at, at @ MATRIX.T + SHIFT]))
     drawn = owners(points, faces)
@@ -123,13 +123,13 @@ def test_an_affine_motion_of_all_points_is_that_of_every_pixel(points, triangles
 
 
 def test_whole_pixels_change_nothing_else(points, triangles):
-    faces = facing(triangles, points)
+    faces = orient_triangles(triangles, points)
     moved = owners(points + np.array([5, 3]), faces)
     np.testing.assert_array_equal(moved[3:, 5:], owners(points, faces)[:-3, :-5])
 
 
 def test_points_far_off_are_no_harm(points, triangles):
-    faces = facing(triangles, points)
+    faces = orient_triangles(triangles, points)
     far = points.copy()
     far[4:] += 1e12
     assert (covered(far, faces) >= 1).all()
@@ -137,8 +137,8 @@ def test_points_far_off_are_no_harm(points, triangles):
 
 def test_bad_input_is_named(points, triangles):
     with pytest.raises(InputError, match="finite"):
-        snapped(points * np.nan)
+        to_subpixels(points * np.nan)
     with pytest.raises(InputError, match="triangles"):
-        facing(triangles, points[:5])
+        orient_triangles(triangles, points[:5])
     with pytest.raises(InputError, match="none without area"):
-        facing([[0, 1, 1]], points)
+        orient_triangles([[0, 1, 1]], points)

@@ -182,12 +182,12 @@ def test_nothing_to_track(clock: Clock, tracker: Tracker) -> None:
 def test_an_error_is_not_swallowed_and_the_source_is_closed(clock: Clock, tracker: Tracker) -> None:
     source = Source(clock)
 
-    class Broken(Receiver):
+    class DocumentError(Receiver):
         def send(self, moment: Moment | None, seconds: float) -> None:
             raise InputError("unit", "another", "this")
 
     with pytest.raises(InputError):
-        track_live(source, tracker, [Broken()], clock=clock)
+        track_live(source, tracker, [DocumentError()], clock=clock)
     assert source.closed
 
 

@@ -5,12 +5,12 @@ import pytest
 
 from marbled import GENERIC, Person
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.numeric.raster.rasterizer import rasterize
 from mien.reconstruction.dense.crops import visible_mesh
 from mien.reconstruction.dense.surface_tracks import NO_TRACKS, Tracks, find_tracks
 
-Photos = list[tuple[View, Camera]]
+Photos = list[tuple[CapturedView, Camera]]
 
 
 @pytest.fixture(scope="module")

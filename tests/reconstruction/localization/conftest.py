@@ -6,7 +6,7 @@ import pytest
 
 from marbled import Person, photographed
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from people import person
 
 
@@ -16,6 +16,6 @@ def ann() -> Person:
 
 
 @pytest.fixture(scope="session")
-def frontal(ann: Person) -> list[tuple[View, Camera]]:
+def frontal(ann: Person) -> list[tuple[CapturedView, Camera]]:
     """Photos of her in which a detector would find the face."""
     return photographed(ann, (-40.0, 0.0, 40.0))

@@ -9,7 +9,7 @@ import pytest
 
 from marbled import GENERIC, Person, at, clutter
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.numeric.rotation import angle_between
 from mien.reconstruction.localization.alignment import align, improve
 from mien.reconstruction.localization.camera_refinement import FocalBelief
@@ -20,7 +20,7 @@ BELIEF = FocalBelief(TRUE.focal_px, 0.05)
 
 
 @pytest.fixture(scope="module")
-def gallery(ann: Person, frontal: list[tuple[View, Camera]]) -> Gallery:
+def gallery(ann: Person, frontal: list[tuple[CapturedView, Camera]]) -> Gallery:
     return Gallery(frontal, ann.vertices, GENERIC)
 
 

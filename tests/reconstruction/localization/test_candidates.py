@@ -9,12 +9,12 @@ import pytest
 
 from marbled import GENERIC, Person, at, clutter
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.numeric.rotation import angle_between
 from mien.reconstruction.localization.candidates import Look, find_looks, find_starts
 from mien.reconstruction.localization.gallery import Gallery
 
-Known = list[tuple[View, Camera]]
+Known = list[tuple[CapturedView, Camera]]
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ import pytest
 
 from marbled import GENERIC, Person, at
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.reconstruction.localization.gallery import Gallery, reduced, resized_to
 
-Known = list[tuple[View, Camera]]
+Known = list[tuple[CapturedView, Camera]]
 
 
 @pytest.fixture(scope="module")

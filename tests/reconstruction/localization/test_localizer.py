@@ -11,7 +11,7 @@ from marbled import GENERIC, SIZE, Person, at, clutter, photographed
 from mien.arrays import Array
 from mien.camera import Camera
 from mien.capture.images.photos import Photo
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
 from mien.reconstruction.fit import FitOptions, fit_views
@@ -19,12 +19,14 @@ from mien.reconstruction.localization import place_view, place_views
 from people import cameras, person
 from people import photographed as marked
 
-Known = list[tuple[View, Camera]]
+Known = list[tuple[CapturedView, Camera]]
 TRUE = {"left": at(75.0, 12.0, 6.0), "right": at(-90.0, -8.0, distance=1100.0)}
 
 
-def view_of(pixels: Array) -> View:
-    return View(Photo("photo.png", Path("photo.png"), np.ascontiguousarray(pixels)), None, None)
+def view_of(pixels: Array) -> CapturedView:
+    return CapturedView(
+        Photo("photo.png", Path("photo.png"), np.ascontiguousarray(pixels)), None, None
+    )
 
 
 def landscape() -> Array:

@@ -1,4 +1,4 @@
-"""What is put around a photo."""
+"""The border that is added around a photo."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def test_the_photo_lies_in_the_middle(photo):
     np.testing.assert_array_equal(larger[margin:-margin, margin:-margin], photo)
 
 
-def test_a_photo_of_one_colour_goes_on():
+def test_a_photo_of_one_colour_is_continued():
     larger, _ = pad_with_blurred_border(np.full((20, 30, 3), (10, 128, 255), np.uint8))
     assert (larger == (10, 128, 255)).all()
 
 
-def test_it_joins_the_photo_and_loses_its_stripes(photo):
-    """Along lines beside the edge, neighbours differ the less the farther they are from it."""
+def test_the_border_joins_the_photo_and_loses_its_stripes(photo):
+    """Along lines beside the edge, neighbours differ less the farther they are from it."""
     larger, margin = pad_with_blurred_border(photo)
     rows = larger[margin - np.arange(margin), margin : margin + 90].astype(float)
     np.testing.assert_allclose(rows[1], photo[0], atol=40)
@@ -38,7 +38,7 @@ def test_it_joins_the_photo_and_loses_its_stripes(photo):
     assert stripes[-1] < 2
 
 
-def test_what_is_far_does_not_jump():
+def test_colours_outside_are_continuous():
     """Between neighbours, nothing outside changes more than the edge of a smooth photo does."""
     y, x = np.mgrid[:60, :90]
     photo = np.stack([2 * x, 2 * y, 90 + x - y], axis=2).astype(np.uint8)

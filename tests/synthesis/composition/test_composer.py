@@ -11,7 +11,7 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
 from mien.errors import InputError
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.synthesis.composition.border_padding import pad_with_blurred_border
 from mien.synthesis.composition.composer import Composer
 from mien.synthesis.examples.example_set import Example, ExampleSet
@@ -44,7 +44,7 @@ def layout():
     return load_feature_layout()
 
 
-def made(layout, photos, standard=0):
+def examples_of(layout, photos, standard=0):
     """Examples that jitter around the mean face, with these photos."""
     rng = np.random.default_rng(0)
     base = layout.template - layout.template.mean(0)
@@ -60,15 +60,15 @@ def made(layout, photos, standard=0):
 def noisy(layout):
     rng = np.random.default_rng(1)
     shape = (HEIGHT, WIDTH, 3)
-    return made(layout, [rng.integers(0, 256, shape, np.uint8) for _ in range(COUNT)], 2)
+    return examples_of(layout, [rng.integers(0, 256, shape, np.uint8) for _ in range(COUNT)], 2)
 
 
-def shares(example_set, row):
+def same_everywhere(example_set, row):
     return np.tile(np.asarray(row, float), (len(example_set.subregions.names), 1))
 
 
 def similarity(a, b, x, y):
-    return PlanarMotion(np.array(a), np.array(b), np.array([x, y], float))
+    return PlanarSimilarity(np.array(a), np.array(b), np.array([x, y], float))
 
 
 def grown(mask, by):
@@ -96,7 +96,7 @@ def core(example_set):
 
 
 def test_neutral_at_its_own_points_is_its_photo(noisy):
-    image = Composer(noisy).render(noisy.neutral.points, shares(noisy, [1, 0, 0, 0]))
+    image = Composer(noisy).render(noisy.neutral.points, same_everywhere(noisy, [1, 0, 0, 0]))
     np.testing.assert_array_equal(image, noisy.neutral.photo)
 
 
@@ -104,7 +104,7 @@ def test_neutral_at_its_own_points_is_its_photo(noisy):
 def test_an_examples_own_points_give_that_example(noisy, index):
     example = noisy.examples[index]
     composer = Composer(noisy)
-    own, motion = shares(noisy, np.eye(COUNT)[index]), composer.head_motion(example.points)
+    own, motion = same_everywhere(noisy, np.eye(COUNT)[index]), composer.head_motion(example.points)
     image = composer.render(example.points, own, motion=motion)
     inside = core(noisy)
     assert inside.mean() > 0.1
@@ -114,7 +114,7 @@ def test_an_examples_own_points_give_that_example(noisy, index):
 @pytest.mark.parametrize("motion", [None, similarity(1, 0, 0, 0)])
 def test_outside_of_the_mesh_the_neutral_photo_stays(noisy, motion):
     points = noisy.neutral.points + np.random.default_rng(4).normal(0, 2, (1, 2))
-    image = Composer(noisy).render(points, shares(noisy, [0, 1, 0, 0]), motion=motion)
+    image = Composer(noisy).render(points, same_everywhere(noisy, [0, 1, 0, 0]), motion=motion)
     outside = ~grown(meshed(noisy), 2)
     assert outside.any()
     np.testing.assert_array_equal(image[outside], noisy.neutral.photo[outside])
@@ -124,9 +124,11 @@ def test_outside_of_the_mesh_the_neutral_photo_stays(noisy, motion):
 def test_around_the_subregions_the_neutral_photo_follows_the_mesh(layout):
     """Examples are black: what is not, is neutral; it moves as the points next to it do."""
     black = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-    example_set = made(layout, [rounded(painted(centres())), black])
+    example_set = examples_of(layout, [rounded(painted(centres())), black])
     neutral = example_set.neutral.points
-    image = Composer(example_set).render(neutral + np.array([6, 0]), shares(example_set, [0, 1]))
+    image = Composer(example_set).render(
+        neutral + np.array([6, 0]), same_everywhere(example_set, [0, 1])
+    )
     off_face = grown(example_set.subregions.fades.sum(2) > 0, 8)
     ring = grown(meshed(example_set), -2) & ~off_face
     assert ring.any()
@@ -147,7 +149,7 @@ def test_a_moved_picture_is_the_unmoved_one_moved(noisy):
         points + np.array([17, 9]), coefficients, motion=similarity(1, 0, 17, 9), size=size
     )
     np.testing.assert_array_equal(moved[9 : 9 + HEIGHT, 17 : 17 + WIDTH], still)
-    # Beyond its edges the photo goes on.
+    # Beyond its edges the photo is continued.
     larger, margin = pad_with_blurred_border(noisy.neutral.photo)
     above = larger[margin - 9 : margin, margin - 17 : margin - 17 + size[0]]
     np.testing.assert_array_equal(moved[:9], above)
@@ -156,9 +158,9 @@ def test_a_moved_picture_is_the_unmoved_one_moved(noisy):
 @pytest.mark.parametrize("motion", [similarity(1, 0, 0.5, -0.25), similarity(1.1, 0.2, 31, -33)])
 def test_the_picture_moves_with_the_head(layout, motion):
     """Mesh and background show the same motion, and meet."""
-    example_set = made(layout, [rounded(painted(centres()))])
+    example_set = examples_of(layout, [rounded(painted(centres()))])
     points = motion(example_set.neutral.points)
-    image = Composer(example_set).render(points, shares(example_set, [1]), motion=motion)
+    image = Composer(example_set).render(points, same_everywhere(example_set, [1]), motion=motion)
     back = motion.undo(centres())
     seen = ((back > 1) & (back < [WIDTH - 1, HEIGHT - 1])).all(2)
     assert seen.mean() > 0.7
@@ -166,10 +168,12 @@ def test_the_picture_moves_with_the_head(layout, motion):
 
 
 def test_an_affine_motion_of_all_points_is_that_of_the_picture(layout):
-    example_set = made(layout, [rounded(painted(centres()))])
+    example_set = examples_of(layout, [rounded(painted(centres()))])
     # Not a similarity: the frame around the face follows only nearly, the face's inside exactly.
     points = example_set.neutral.points
-    image = Composer(example_set).render(points @ MATRIX.T + SHIFT, shares(example_set, [1]))
+    image = Composer(example_set).render(
+        points @ MATRIX.T + SHIFT, same_everywhere(example_set, [1])
+    )
     back = (centres() - SHIFT) @ np.linalg.inv(MATRIX).T
     inside = core(example_set)
     assert psnr(image[inside], painted(back)[inside]) > 40
@@ -178,9 +182,11 @@ def test_an_affine_motion_of_all_points_is_that_of_the_picture(layout):
 def test_plain_colours_mix_exactly(layout):
     colours = np.array([[10, 200, 30], [250, 0, 90], [100, 100, 250]])
     photos = [np.full((HEIGHT, WIDTH, 3), colour, np.uint8) for colour in colours]
-    example_set = made(layout, photos)
+    example_set = examples_of(layout, photos)
     row = np.array([0.2, 0.5, 0.3])
-    image = Composer(example_set).render(example_set.neutral.points, shares(example_set, row))
+    image = Composer(example_set).render(
+        example_set.neutral.points, same_everywhere(example_set, row)
+    )
     inside = image[core(example_set)]
     np.testing.assert_array_equal(inside, np.broadcast_to(rounded(row @ colours), inside.shape))
 
@@ -199,7 +205,7 @@ def test_any_number_of_threads_gives_the_same_bytes(noisy):
     assert all(np.array_equal(image, images[0]) for image in images)
 
 
-def test_shares_left_out_change_little(noisy):
+def test_small_coefficients_left_out_change_little(noisy):
     rng = np.random.default_rng(3)
     skip = 0.02
     coefficients = rng.dirichlet([5, 0.1, 0.1, 3], len(noisy.subregions.names))
@@ -211,31 +217,31 @@ def test_shares_left_out_change_little(noisy):
 
 def test_draws_into_memory_that_is_there(noisy):
     out = np.empty_like(noisy.neutral.photo)
-    coefficients = shares(noisy, [0.5, 0.5, 0, 0])
+    coefficients = same_everywhere(noisy, [0.5, 0.5, 0, 0])
     assert Composer(noisy).render(noisy.neutral.points, coefficients, out=out) is out
     np.testing.assert_array_equal(out, Composer(noisy).render(noisy.neutral.points, coefficients))
 
 
-def test_a_face_outside_of_the_picture_is_no_harm(noisy):
+def test_a_face_outside_of_the_picture_is_not_drawn(noisy):
     motion = similarity(1, 0, WIDTH, 40)
     points = noisy.neutral.points + np.array([2 * WIDTH, 40])
-    image = Composer(noisy).render(points, shares(noisy, [0, 0, 1, 0]), motion=motion)
+    image = Composer(noisy).render(points, same_everywhere(noisy, [0, 0, 1, 0]), motion=motion)
     larger, margin = pad_with_blurred_border(noisy.neutral.photo)
     beside = larger[margin : margin + HEIGHT - 40, margin - 20 : margin]
     np.testing.assert_array_equal(image[40:, -20:], beside)
 
 
-def test_points_that_leave_the_frame_are_no_harm(noisy):
+def test_points_outside_of_the_frame_are_accepted(noisy):
     points = noisy.neutral.points + np.array([WIDTH, 0.6 * HEIGHT])
-    image = Composer(noisy).render(points, shares(noisy, [0, 0, 1, 0]))
+    image = Composer(noisy).render(points, same_everywhere(noisy, [0, 0, 1, 0]))
     np.testing.assert_array_equal(image[:20, :20], noisy.neutral.photo[:20, :20])
 
 
-def test_points_as_far_as_numbers_go_are_no_harm(noisy):
+def test_points_of_any_size_are_accepted(noisy):
     points = np.array(noisy.neutral.points)
     points[::7] += 1e12
     points[::5] -= 1e300
-    composer, coefficients = Composer(noisy), shares(noisy, [0.5, 0.5, 0, 0])
+    composer, coefficients = Composer(noisy), same_everywhere(noisy, [0.5, 0.5, 0, 0])
     composer.render(points, coefficients, size=(33, 1))
     assert composer.render(points, coefficients).shape == noisy.neutral.photo.shape
 
@@ -244,21 +250,23 @@ def test_photos_may_differ_in_size(layout):
     """The second one shows the same at half the size: it gives the same picture, blurred."""
     picture = painted(centres())
     small = painted(2 * centres()[: HEIGHT // 2, : WIDTH // 2])
-    example_set = made(layout, [rounded(picture), rounded(small)])
+    example_set = examples_of(layout, [rounded(picture), rounded(small)])
     neutral, half = example_set.examples
     half = Example(half.name, half.photo, neutral.points / 2, "")
     example_set = replace(example_set, examples=(neutral, half))
-    image = Composer(example_set).render(neutral.points, shares(example_set, [0, 1]))
+    image = Composer(example_set).render(neutral.points, same_everywhere(example_set, [0, 1]))
     inside = core(example_set)
     assert psnr(image[inside], picture[inside]) > 35
 
 
-def test_shares_below_zero_are_taken_away(layout):
+def test_negative_coefficients_subtract(layout):
     colours = [(10, 200, 30), (50, 100, 90)]
     photos = [np.full((HEIGHT, WIDTH, 3), colour, np.uint8) for colour in colours]
-    example_set = made(layout, photos)
+    example_set = examples_of(layout, photos)
     row = np.array([1.25, -0.25])
-    image = Composer(example_set).render(example_set.neutral.points, shares(example_set, row))
+    image = Composer(example_set).render(
+        example_set.neutral.points, same_everywhere(example_set, row)
+    )
     inside = image[core(example_set)]
     expected = rounded(np.clip(row @ np.array(colours), 0, 255))
     np.testing.assert_array_equal(inside, np.broadcast_to(expected, inside.shape))
@@ -266,7 +274,7 @@ def test_shares_below_zero_are_taken_away(layout):
 
 def test_bad_input_is_named(noisy):
     composer, points = Composer(noisy), noisy.neutral.points
-    good = shares(noisy, [1, 0, 0, 0])
+    good = same_everywhere(noisy, [1, 0, 0, 0])
     with pytest.raises(InputError, match="points"):
         composer.render(points[:5], good)
     with pytest.raises(InputError, match="finite"):

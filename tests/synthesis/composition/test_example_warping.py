@@ -1,4 +1,4 @@
-"""Photos drawn over other points."""
+"""Photos warped to other points."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def ramps() -> np.ndarray:
     return picture.astype(np.uint8)
 
 
-def test_every_pixel_shows_its_place_in_the_photo():
+def test_every_pixel_shows_its_position_in_the_photo():
     """The square is turned by a quarter, made half as large and moved."""
     points = np.array([[20.0, 40.0], [20.0, 20.0], [40.0, 20.0], [40.0, 40.0]])
     raster = rasterize(SQUARE, np.ones(4), TRIANGLES, 60, 60)
-    drawn = warp_to_raster(ramps(), points, TRIANGLES, raster)
+    warped = warp_to_raster(ramps(), points, TRIANGLES, raster)
     rows, columns = np.nonzero(raster.mask)
     x, y = columns + 0.5, rows + 0.5
     expected = np.stack([2 * (20 + (y - 10) / 2), 2 * (40 - (x - 10) / 2)], axis=-1)
-    np.testing.assert_allclose(drawn[rows, columns, :2], expected, atol=0.6)
-    assert (drawn[~raster.mask] == 0).all()
+    np.testing.assert_allclose(warped[rows, columns, :2], expected, atol=0.6)
+    assert (warped[~raster.mask] == 0).all()

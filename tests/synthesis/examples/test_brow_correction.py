@@ -54,7 +54,7 @@ def raised(layout, points, side, inner, outer):
     return moved
 
 
-def test_brows_that_are_where_they_should_be_stay(layout, points):
+def test_correct_brows_stay(layout, points):
     found = correct_brows(layout, painted(layout, points), points)
     assert np.abs(found - points).max() < 0.005 * WIDTH
 
@@ -71,7 +71,7 @@ def test_a_raised_brow_is_found_and_the_rest_of_the_face_stays(layout, points, i
 
 
 def test_a_brow_does_not_overtake_the_forehead(layout, points):
-    """One as high as the forehead's points pushes them up; what is folded over would be torn."""
+    """One as high as the forehead's points pushes them up; what folds is torn."""
     points = points.copy()
     skin = [i for i, name in enumerate(layout.names) if "forehead" in name]
     points[skin, 1] += 0.05 * WIDTH
@@ -90,8 +90,8 @@ def test_a_brow_does_not_overtake_the_forehead(layout, points):
 def folded(layout, points):
     """How many triangles lie the other way round than on the template."""
 
-    def sides(places):
-        corners = np.concatenate([places, layout.frame(places)])[layout.triangles]
+    def sides(positions):
+        corners = np.concatenate([positions, layout.frame(positions)])[layout.triangles]
         return np.sign(np.linalg.det(np.diff(corners, axis=1)))
 
     return int((sides(points) * sides(WIDTH * layout.template) < 0).sum())
@@ -102,8 +102,8 @@ def test_a_head_on_its_side(layout, points):
     true = raised(layout, points, "right", 0.06, 0.06)
     picture = np.rot90(painted(layout, true))
 
-    def turned(places):
-        return np.column_stack([places[:, 1], 420 - places[:, 0]])
+    def turned(positions):
+        return np.column_stack([positions[:, 1], 420 - positions[:, 0]])
 
     found = correct_brows(layout, picture, turned(points))
     off = np.linalg.norm(found - turned(true), axis=1)
@@ -139,7 +139,7 @@ def test_points_do_not_jump(layout, points):
 
 
 def test_landmarks_and_outside(layout, points):
-    landmarks = np.linalg.lstsq(layout.mixes, points, rcond=None)[0]
+    landmarks = np.linalg.lstsq(layout.landmark_weights, points, rcond=None)[0]
     true = raised(layout, points, "left", 0.06, 0.06)
     found = detected_points(layout, painted(layout, true), landmarks)
     assert np.linalg.norm(found - true, axis=1)[rows_of(layout, "left")].max() < 0.015 * WIDTH

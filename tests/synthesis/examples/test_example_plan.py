@@ -51,7 +51,7 @@ def points(layout: FeatureLayout) -> Array:
 
 
 def series_of(names: Sequence[str] = (), **changes: Array) -> FaceSeries:
-    """Six frames at rest but for the third to the fifth."""
+    """Six frames at rest except the third to the fifth."""
     blendshapes = np.stack([scored()] * 2 + [scored(jawOpen=0.9)] * 3 + [scored()])
     scores = FrameScores(
         np.arange(6),
@@ -98,8 +98,8 @@ def test_the_motion_of_the_head_is_no_expression(layout: FeatureLayout, points: 
 
 
 def test_everything_can_be_overruled(layout: FeatureLayout, points: Array) -> None:
-    wishes = SelectionOverrides(neutral=0, standard=4, include=(5, 0), exclude=(3,))
-    plan = plan_examples(layout, series_of(), points, wishes=wishes)
+    overrides = SelectionOverrides(neutral=0, standard=4, include=(5, 0), exclude=(3,))
+    plan = plan_examples(layout, series_of(), points, overrides=overrides)
     assert chosen(plan) == [0, 4, 5, 2]
     assert plan.standard == 1
     assert plan.choice.reasons[4:] == ("standard, as asked for", "as asked for")
@@ -107,19 +107,19 @@ def test_everything_can_be_overruled(layout: FeatureLayout, points: Array) -> No
     assert len(plan.statistics) == 5
 
 
-def test_wishes_that_contradict_each_other(layout: FeatureLayout, points: Array) -> None:
+def test_overrides_that_contradict_each_other(layout: FeatureLayout, points: Array) -> None:
     with pytest.raises(InputError, match="exclude: expected others than those that are wanted"):
         plan_examples(
-            layout, series_of(), points, wishes=SelectionOverrides(include=(3,), exclude=(3,))
+            layout, series_of(), points, overrides=SelectionOverrides(include=(3,), exclude=(3,))
         )
 
 
-def test_unfit_and_blurred_ones_are_neither_rest_nor_standard_nor_statistics(
+def test_rejected_and_blurred_ones_are_neither_rest_nor_standard_nor_statistics(
     layout: FeatureLayout, points: Array
 ) -> None:
     sharpness = np.array([1.0, 1.2, 0.2, 1, 1, 1])
-    unfit = ("", "covered", "", "", "", "")
-    plan = plan_examples(layout, series_of(sharpness=sharpness), points, unfit=unfit)
+    rejections = ("", "covered", "", "", "", "")
+    plan = plan_examples(layout, series_of(sharpness=sharpness), points, rejections=rejections)
     assert chosen(plan)[:2] == [0, 4]
     assert plan.choice.reasons[1:3] == ("covered", "blurred, 20% of the usual sharpness")
     assert len(plan.statistics) == 4
@@ -148,7 +148,7 @@ def photos_of(plan: ExamplePlan) -> dict[int, Photo]:
 
 def test_examples_of_a_plan(layout: FeatureLayout, points: Array) -> None:
     plan = plan_examples(layout, series_of(), points)
-    examples, why = build_examples(plan, photos_of(plan), source="anna.mp4", even=False)
+    examples, why = build_examples(plan, photos_of(plan), source="anna.mp4", equalize=False)
     assert [example.name for example in examples.examples[:2]] == ["frame_000001", "frame_000002"]
     assert examples.neutral.source == "anna.mp4, frame 000001"
     assert why["frame_000001"] == "neutral"
@@ -179,10 +179,10 @@ def test_gaps_of_lips(layout: FeatureLayout, points: Array) -> None:
     np.testing.assert_allclose(lip_gaps(layout, points), OPEN)
 
 
-def test_better_points_of_the_examples_make_all_geometries_of_their_kind(
+def test_the_correction_of_the_examples_points_is_applied_to_all(
     layout: FeatureLayout, points: Array
 ) -> None:
-    """A detector that has every brow 2 px too low: known from the examples, undone in all."""
+    """A detector that has every brow 2 px too low: measured in the examples, corrected in all."""
     shift = np.zeros_like(points[0])
     brows = [index for index, name in enumerate(layout.names) if "_brow_" in name]
     shift[brows, 1] = -2.0
@@ -193,6 +193,6 @@ def test_better_points_of_the_examples_make_all_geometries_of_their_kind(
     np.testing.assert_allclose(moved.points[chosen(plan)], list(better.values()))
     np.testing.assert_allclose(moved.geometries, truth.geometries, atol=0.05)
     assert np.abs(plan.geometries - truth.geometries).max() > 1
-    built, _ = build_examples(moved, photos_of(plan), even=False)
+    built, _ = build_examples(moved, photos_of(plan), equalize=False)
     np.testing.assert_allclose(built.neutral.points, points[chosen(plan)[0]] + shift)
     np.testing.assert_allclose(built.statistics, moved.statistics)

@@ -1,4 +1,4 @@
-"""Examples speak of the same points, and of geometry without the head's motion."""
+"""Examples have the same points, and geometries without head motion."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import Subregions
 from mien.errors import InputError
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
-TURNED = PlanarMotion(np.array(0.9), np.array(0.1), np.array([7.0, -3.0]))
+TURNED = PlanarSimilarity(np.array(0.9), np.array(0.1), np.array([7.0, -3.0]))
 PHOTO = np.zeros((120, 100, 3), np.uint8)
 
 
@@ -74,7 +74,7 @@ def test_bad_examples(photo, points, message):
         Example("joy", photo, points, "joy.png")
 
 
-def test_teeth_are_of_examples_that_there_are(example_set):
+def test_teeth_are_indices_of_examples(example_set):
     assert replace(example_set, teeth=(1,)).teeth == (1,)
     with pytest.raises(InputError, match="teeth: expected the index of one of 2 examples, got 2"):
         replace(example_set, teeth=(0, 2))
@@ -85,7 +85,7 @@ def test_at_least_one(example_set):
         replace(example_set, examples=())
 
 
-def test_names_are_unlike(example_set):
+def test_names_are_unique(example_set):
     with pytest.raises(InputError, match="'neutral' twice"):
         replace(example_set, examples=(example_set.neutral,) * 2)
 

@@ -22,8 +22,8 @@ def layout():
 @pytest.fixture
 def face(layout, rng):
     """A smooth pattern with noise, of middling brightness."""
-    places = np.mgrid[:160, :140].sum(axis=0)[..., None] / 25
-    photo = 110 + 40 * np.sin(places + np.arange(3)) + rng.normal(size=(160, 140, 3))
+    positions = np.mgrid[:160, :140].sum(axis=0)[..., None] / 25
+    photo = 110 + 40 * np.sin(positions + np.arange(3)) + rng.normal(size=(160, 140, 3))
     return Example("rest", photo.round().astype(np.uint8), 70 + 80 * layout.template, "a")
 
 
@@ -33,7 +33,7 @@ def test_gains_are_those_that_the_photos_were_made_with(layout, face):
 
 
 def test_an_expression_and_a_moved_head_are_no_exposure(layout, face):
-    """What is unlike in a tenth of the face, and where the photo is cut differently."""
+    """A tenth of the face differs, and the photo is cut differently."""
     photo = np.roll(apply_gain(face.photo, 1 / GAIN), (7, -5), axis=(0, 1))
     chin = np.rint(face.points[layout.index("chin")]).astype(int)
     photo[chin[1] - 12 : chin[1] + 12, chin[0] - 12 : chin[0] + 12] = 20
@@ -50,7 +50,7 @@ def test_white_and_black_are_not_compared(layout, face):
     np.testing.assert_array_equal(exposure_gains(layout, [face, black])[1], 1)
 
 
-def test_evened_ones_look_alike_and_others_stay_as_they_are(layout, face):
+def test_other_exposures_are_equalized_and_noise_is_ignored(layout, face):
     darker = replace(face, name="b", photo=apply_gain(face.photo, 1 / GAIN))
     alike = replace(face, name="c", photo=apply_gain(face.photo, np.full(3, 1.02)))
     found = equalize_exposure(layout, (face, darker, alike))

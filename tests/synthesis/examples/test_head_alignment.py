@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mien.errors import EstimationError, InputError
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.synthesis.examples.head_alignment import align_to_neutral
 
-TRUE = PlanarMotion(np.array(1.1), np.array(-0.3), np.array([40.0, -12.0]))
+TRUE = PlanarSimilarity(np.array(1.1), np.array(-0.3), np.array([40.0, -12.0]))
 
 
 @pytest.fixture

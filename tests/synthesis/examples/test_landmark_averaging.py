@@ -1,4 +1,4 @@
-"""Feature points from several looks at a picture."""
+"""Feature points averaged over several detections in a picture."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def photo():
 
 
 @pytest.fixture(scope="module")
-def seen(photo):
-    """Landmarks of a single look, and steady points of the photo and of its mirror image."""
+def detections(photo):
+    """Landmarks of one detection, and averaged points, of the photo and of its mirror image."""
     mirrored = np.ascontiguousarray(photo[:, ::-1])
     with LandmarkDetector() as detector:
         landmarks = [detector.detect_fast(image).points[:, :2] for image in (photo, mirrored)]
@@ -37,65 +37,65 @@ def seen(photo):
     return landmarks, points
 
 
-def test_steady_points_are_where_a_single_look_has_them(seen):
-    (landmarks, _), (points, _) = seen
+def test_averaged_points_are_near_those_of_a_single_detection(detections):
+    (landmarks, _), (points, _) = detections
     once = LAYOUT.from_landmarks(landmarks)
     width = np.ptp(once[:, 0])
     assert np.linalg.norm(points - once, axis=1).mean() < 0.02 * width
     assert np.linalg.norm(points.mean(0) - once.mean(0)) < 0.01 * width
 
 
-def test_the_mirrored_picture_has_mirrored_points(seen, photo):
-    """But for where the views are cut, looks at one picture are looks at the other."""
-    landmarks, (points, mirrored) = seen
+def test_the_mirrored_picture_has_mirrored_points(detections, photo):
+    """Except at the edges of the crops, both pictures give the same crops."""
+    landmarks, (points, mirrored) = detections
 
-    def apart(one, other):
+    def difference(one, other):
         back = other[LAYOUT.mirror] * [-1, 1] + [photo.shape[1], 0]
         return np.linalg.norm(one - back, axis=1).mean()
 
-    single = apart(*(LAYOUT.from_landmarks(found) for found in landmarks))
-    assert apart(points, mirrored) < 0.7 * single
+    single = difference(*(LAYOUT.from_landmarks(found) for found in landmarks))
+    assert difference(points, mirrored) < 0.7 * single
 
 
-def _detector(sight):
-    return SimpleNamespace(detect_fast=lambda view: sight)
+def _detector(face):
+    return SimpleNamespace(detect_fast=lambda crop: face)
 
 
-def test_a_face_that_is_not_found_again_stays(seen, photo):
-    landmarks = seen[0][0]
+def test_without_another_detection_the_points_stay(detections, photo):
+    landmarks = detections[0][0]
     points = averaged_points(LAYOUT, _detector(None), photo, landmarks)
     np.testing.assert_array_equal(points, LAYOUT.from_landmarks(landmarks))
 
 
-def test_points_of_a_large_picture_are_not_shifted(seen):
-    """Reduced, it is 429.4 px wide, for which 429 stand; three marks tell where a view is."""
+def test_points_of_a_large_picture_are_not_shifted(detections):
+    """Reduced, it is 429.4 px wide, for which 429 stand; three marks show where a crop is."""
     marks = np.array([[300.5, 1000.5], [750.5, 1100.5], [450.5, 1550.5]])
     picture = np.zeros((1777, 1000, 3), np.uint8)
     for channel, (x, y) in enumerate(marks.astype(int)):
         picture[y - 10 : y + 11, x - 10 : x + 11, channel] = 255
-    face = seen[0][0]
+    face = detections[0][0]
     landmarks = (face - face.min(axis=0)) * (400 / np.ptp(face[:, 0])) + [300, 1000]
-    looks = []
+    crops = []
 
-    def look(view):
-        places = np.indices(view.shape[:2])[::-1] + 0.5
-        weights = view.astype(float)
+    def detect(crop):
+        positions = np.indices(crop.shape[:2])[::-1] + 0.5
+        weights = crop.astype(float)
         if not (sums := weights.sum(axis=(0, 1))).all():
             return None
-        found = np.einsum("dyx,yxc->cd", places, weights) / sums[:, None]
-        looks.append(view)
-        to_view = np.linalg.solve(np.column_stack([marks, np.ones(3)]), found)
-        return SimpleNamespace(points=np.column_stack([landmarks, np.ones(478)]) @ to_view)
+        found = np.einsum("dyx,yxc->cd", positions, weights) / sums[:, None]
+        crops.append(crop)
+        to_crop = np.linalg.solve(np.column_stack([marks, np.ones(3)]), found)
+        return SimpleNamespace(points=np.column_stack([landmarks, np.ones(478)]) @ to_crop)
 
-    points = averaged_points(LAYOUT, SimpleNamespace(detect_fast=look), picture, landmarks)
-    assert len(looks) == 6
+    points = averaged_points(LAYOUT, SimpleNamespace(detect_fast=detect), picture, landmarks)
+    assert len(crops) == 6
     np.testing.assert_allclose(points, LAYOUT.from_landmarks(landmarks), atol=0.1)
 
 
-def test_another_face_has_no_say(seen, photo):
-    landmarks = seen[0][0]
-    stranger = SimpleNamespace(points=np.zeros((478, 3)))
-    points = averaged_points(LAYOUT, _detector(stranger), photo, landmarks)
+def test_a_detection_of_another_face_is_left_out(detections, photo):
+    landmarks = detections[0][0]
+    other = SimpleNamespace(points=np.zeros((478, 3)))
+    points = averaged_points(LAYOUT, _detector(other), photo, landmarks)
     np.testing.assert_array_equal(points, LAYOUT.from_landmarks(landmarks))
 
 

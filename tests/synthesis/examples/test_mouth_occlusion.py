@@ -28,11 +28,11 @@ def face(layout, *, hand=False):
     if hand:
         corner = np.rint(points[layout.index("right_mouth_corner")]).astype(int)
         cv2.circle(picture, corner.tolist(), 40, HAND, -1)
-    landmarks = np.linalg.lstsq(layout.mixes, points, rcond=None)[0]
+    landmarks = np.linalg.lstsq(layout.landmark_weights, points, rcond=None)[0]
     return picture, landmarks
 
 
-def seen(layout, hands):
+def measured(layout, hands):
     lips = LipContrast(layout)
     for hand in hands:
         lips(*face(layout, hand=hand))
@@ -41,29 +41,29 @@ def seen(layout, hands):
 
 def test_a_hand_before_the_mouth(layout):
     hands = np.arange(20) >= 16
-    np.testing.assert_array_equal(seen(layout, hands).covered(), hands)
+    np.testing.assert_array_equal(measured(layout, hands).occluded(), hands)
 
 
-def test_frames_near_in_time_and_in_gaps_are_not_trusted(layout):
+def test_frames_near_in_time_and_in_gaps_are_occluded_too(layout):
     hands = np.isin(np.arange(40), (10, 24))
-    covered = seen(layout, hands).covered(np.arange(40) / 10)
+    occluded = measured(layout, hands).occluded(np.arange(40) / 10)
     # Half a second before and after, and all of the 1.4 s between both.
-    np.testing.assert_array_equal(np.flatnonzero(covered), np.arange(5, 30))
+    np.testing.assert_array_equal(np.flatnonzero(occluded), np.arange(5, 30))
 
 
-def test_few_pictures_do_not_tell(layout):
-    assert not seen(layout, [True, False, False]).covered().any()
+def test_few_pictures_are_never_occluded(layout):
+    assert not measured(layout, [True, False, False]).occluded().any()
 
 
-def test_faces_outside_of_the_picture_are_not_judged(layout):
-    lips = seen(layout, [False] * 15)
+def test_faces_outside_of_the_picture_are_not_occluded(layout):
+    lips = measured(layout, [False] * 15)
     picture, landmarks = face(layout)
     lips(picture, landmarks + 1000)
-    assert not lips.covered().any()
+    assert not lips.occluded().any()
 
 
-def test_light_is_no_hand(layout):
-    lips = seen(layout, [False] * 15)
+def test_another_exposure_is_no_occlusion(layout):
+    lips = measured(layout, [False] * 15)
     picture, landmarks = face(layout)
     lips((picture * 0.5).astype(np.uint8), landmarks)
-    assert not lips.covered().any()
+    assert not lips.occluded().any()

@@ -1,4 +1,4 @@
-"""Pictures that are no good whatever they show: cut, covered, small."""
+"""Pictures that are no good whatever they show: cut, occluded, small."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NONE = np.zeros(5, bool)
 def test_faces_that_the_edge_cuts():
     points = np.tile(FACE, (5, 1, 1))
     points[1] += [0, 90]  # Its chin is 10 px below the edge, a tenth of its width.
-    points[2] += [0, 81]  # 1 px is within what points err by.
+    points[2] += [0, 81]  # 1 px is within the error of the points.
     points[3] -= [103, 0]
     assert rejection_reasons(points, SIZES, NONE) == ("", CUT, "", CUT, "")
 
@@ -30,11 +30,11 @@ def test_small_ones():
     assert rejection_reasons(points, SIZES, NONE)[3:] == ("", "small, 70% of the usual width")
 
 
-def test_covered_ones_and_the_first_reason_counts():
+def test_occluded_ones_and_the_first_reason_counts():
     points = np.tile(FACE, (5, 1, 1))
     points[1] += [0, 90]
-    covered = np.array([False, True, True, False, False])
-    assert rejection_reasons(points, SIZES, covered) == ("", CUT, OCCLUDED, "", "")
+    occluded = np.array([False, True, True, False, False])
+    assert rejection_reasons(points, SIZES, occluded) == ("", CUT, OCCLUDED, "", "")
 
 
 def test_what_most_pictures_have_is_no_fault():

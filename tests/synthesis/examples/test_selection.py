@@ -1,4 +1,4 @@
-"""The choice of examples: what it covers, what it leaves out, and what it says."""
+"""The choice of examples: what it covers, what it leaves out, and its reasons."""
 
 from __future__ import annotations
 
@@ -49,53 +49,53 @@ def test_every_candidate_has_its_reason(candidates):
         assert int(like) // 10 == row // 10
 
 
-def test_what_differs_by_less_than_it_must_is_alike(candidates):
+def test_expressions_that_differ_by_less_than_the_least_distance_are_alike(candidates):
     """Noise is 0.01 px, brows move by 1 px and the mouth by 30."""
-    choice = choose_examples(candidates, REGIONS, 4, least=0.1)
+    choice = choose_examples(candidates, REGIONS, 4, min_distance=0.1)
     assert sorted(row // 10 for row in choice.rows) == [0, 1, 2]
     assert choice.reasons[3] == "like candidate 4"
-    choice = choose_examples(candidates, REGIONS, 4, least=2.0)
+    choice = choose_examples(candidates, REGIONS, 4, min_distance=2.0)
     assert sorted(row // 10 for row in choice.rows) == [0, 2]
     assert choice.reasons[12] == "like candidate 4"
 
 
 def test_reasons_name_the_pictures(candidates):
     named = replace(candidates, names=tuple(f"{row}.jpg" for row in range(30)))
-    assert choose_examples(named, REGIONS, 4, least=0.1).reasons[3] == "like 4.jpg"
+    assert choose_examples(named, REGIONS, 4, min_distance=0.1).reasons[3] == "like 4.jpg"
 
 
-def test_wanted_ones_come_first_whatever_they_are_like(candidates):
+def test_required_ones_come_first_whatever_they_are_like(candidates):
     sharpness = np.ones(30)
     sharpness[7] = 0.1
     blurred = replace(candidates, sharpness=sharpness)
-    wanted = {25: "standard", 7: "as asked for"}
-    choice = choose_examples(blurred, REGIONS, 4, wanted=wanted, count=4, least=0.1)
+    required = {25: "standard", 7: "as asked for"}
+    choice = choose_examples(blurred, REGIONS, 4, required=required, count=4, min_distance=0.1)
     assert list(choice.rows[:3]) == [4, 25, 7]
     assert (choice.reasons[25], choice.reasons[7]) == ("standard", "as asked for")
     # The mouth is there already: only the brows are left.
     assert [row // 10 for row in choice.rows[3:]] == [1]
-    assert not choice.sound[7]
+    assert not choice.eligible[7]
 
 
 def test_excluded_ones_are_no_examples(candidates):
-    choice = choose_examples(candidates, REGIONS, 4, exclude=[*range(10, 20), 5], least=0.1)
+    choice = choose_examples(candidates, REGIONS, 4, exclude=[*range(10, 20), 5], min_distance=0.1)
     assert sorted(row // 10 for row in choice.rows) == [0, 2]
     assert choice.reasons[12] == "excluded"
-    assert choice.sound.sum() == 19
+    assert choice.eligible.sum() == 19
 
 
-def test_unfit_ones_are_no_examples_and_the_reason_is_the_known_one(candidates):
-    unfit = [""] * 10 + ["covered"] * 10 + [""] * 10
+def test_rejected_ones_are_no_examples_and_the_reason_is_the_known_one(candidates):
+    rejections = [""] * 10 + ["covered"] * 10 + [""] * 10
     pose = np.zeros((30, 2))
     pose[12] = [1, 0]
     choice = choose_examples(
-        replace(candidates, unfit=tuple(unfit), pose=pose), REGIONS, 4, least=0.1
+        replace(candidates, rejections=tuple(rejections), pose=pose), REGIONS, 4, min_distance=0.1
     )
     assert sorted(row // 10 for row in choice.rows) == [0, 2]
     assert choice.reasons[12] == "covered"
 
 
-def test_blurred_and_turned_ones_are_left_out(candidates):
+def test_blurred_and_turned_ones_are_rejected(candidates):
     sharpness, pose = np.ones(30), np.zeros((30, 2))
     sharpness[10:15] = 0.3
     pose[20:25] = [0, np.radians(-40)]
@@ -108,7 +108,7 @@ def test_blurred_and_turned_ones_are_left_out(candidates):
 
 def test_where_nothing_is_sharp_nothing_is_blurred(candidates):
     plain = replace(candidates, sharpness=np.zeros(30))
-    assert choose_examples(plain, REGIONS, 4, count=3).sound.all()
+    assert choose_examples(plain, REGIONS, 4, count=3).eligible.all()
 
 
 def test_the_turn_is_measured_from_neutral(candidates):
@@ -145,7 +145,7 @@ def test_a_face_that_never_moves_is_one_example(candidates):
     ("change", "message"),
     [
         ({"neutral": 30}, "neutral: expected one of 30 candidates"),
-        ({"wanted": {31: "x"}}, "wanted: expected one of 30 candidates"),
+        ({"required": {31: "x"}}, "required: expected one of 30 candidates"),
         ({"exclude": [-1]}, "exclude: expected one of 30 candidates"),
         ({"exclude": [4]}, "exclude: expected others than those that are wanted, got neutral"),
         ({"count": 0}, "count: expected a number above zero"),

@@ -14,11 +14,11 @@ HERE = head_subregions()
 SKIN = part_vertices(GENERIC, "skin")
 
 
-def share(name):
+def weight(name):
     return HERE.fades[:, HERE.names.index(name)]
 
 
-def test_fades_are_a_partition_of_the_whole_head():
+def test_weights_sum_to_one_on_the_whole_head():
     assert HERE.fades.shape == (len(GENERIC.mesh.vertices), len(HERE.names))
     np.testing.assert_allclose(HERE.fades.sum(axis=1), 1, atol=1e-12)
     assert HERE.fades.min() >= -1e-12
@@ -33,7 +33,7 @@ def test_members_are_points_of_the_layout():
 def test_left_is_right_mirrored():
     for name in HERE.names:
         other = name.replace("left", "RIGHT").replace("right", "left").replace("RIGHT", "right")
-        np.testing.assert_allclose(share(name)[GENERIC.mirror], share(other), atol=1e-12)
+        np.testing.assert_allclose(weight(name)[GENERIC.mirror], weight(other), atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -46,8 +46,8 @@ def test_left_is_right_mirrored():
     ],
 )
 def test_eyes_and_teeth_are_subregions_of_their_own(part, name):
-    np.testing.assert_array_equal(share(name)[part_vertices(GENERIC, part)], 1)
-    np.testing.assert_array_equal(share(name)[SKIN], 0)
+    np.testing.assert_array_equal(weight(name)[part_vertices(GENERIC, part)], 1)
+    np.testing.assert_array_equal(weight(name)[SKIN], 0)
 
 
 @pytest.mark.parametrize(
@@ -62,24 +62,24 @@ def test_eyes_and_teeth_are_subregions_of_their_own(part, name):
     ],
 )
 def test_features_lie_in_their_subregions(feature, name):
-    assert share(name)[GENERIC.vertex_of(feature)] > 0.9
+    assert weight(name)[GENERIC.vertex_of(feature)] > 0.9
 
 
-def test_what_hangs_on_the_jaw_goes_with_the_chin():
+def test_skin_below_the_jaw_belongs_to_the_chin():
     menton = GENERIC.mesh.vertices[GENERIC.vertex_of("left_jaw.0")]
     below = np.linalg.norm(GENERIC.mesh.vertices - (menton - [0, 0, 8]), axis=1) < 8
-    assert share("chin")[below].min() > 0.8
+    assert weight("chin")[below].min() > 0.8
 
 
 def test_there_is_no_step_on_the_skin_off_the_lips():
     corners = GENERIC.mesh.triangles[GENERIC.mesh.triangles_of("skin")]
     ends = np.vstack([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
-    ends = ends[share("lips")[ends].max(axis=1) == 0]
+    ends = ends[weight("lips")[ends].max(axis=1) == 0]
     length = np.linalg.norm(np.diff(GENERIC.mesh.vertices[ends], axis=1)[:, 0], axis=1)
     steps = np.abs(np.diff(HERE.fades[ends], axis=1)[:, 0])
     assert (steps.max(axis=1) / length).max() < 0.25
 
 
-def test_lashes_go_with_the_lids():
+def test_lashes_belong_to_the_lids():
     lashes = part_vertices(GENERIC, "lashes")
-    assert (share("left_lids") + share("right_lids"))[lashes].min() > 0.9
+    assert (weight("left_lids") + weight("right_lids"))[lashes].min() > 0.9

@@ -77,7 +77,7 @@ def test_each_subregion_takes_its_own_expression():
         assert row[HEAD.rig.names.index(name)] > 0.9
 
 
-def test_the_face_reaches_points_that_no_mix_has():
+def test_the_face_reaches_points_that_no_mixture_has():
     points = points_of(NEUTRAL).copy()
     brow = named("left_brow")
     points[brow] += [0, 4, 0]
@@ -118,7 +118,7 @@ def test_points_that_do_not_move_leave_the_face_at_rest(propagation):
 @pytest.mark.parametrize(
     ("name", "by"), [("nose_tip", [0, 8, 0]), ("nose_tip", [6, 0, 0]), ("left_temple", [0, 6, 0])]
 )
-def test_a_point_that_hardly_ever_moves_does_not_throw_the_others(name, by):
+def test_a_point_of_little_variance_does_not_throw_the_others(name, by):
     """Nothing moves much farther than it does."""
     known = [LAYOUT.index(name)]
     rest = points_of(NEUTRAL)

@@ -11,7 +11,7 @@ from hull import hull_distances
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import Subregions, default_subregions
 from mien.errors import InputError
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.synthesis.examples.example_set import Example, ExampleSet
 from mien.synthesis.inference.coefficients import (
     BROWS,
@@ -22,7 +22,7 @@ from mien.synthesis.inference.coefficients import (
 )
 
 PHOTO = np.zeros((30, 20, 3), np.uint8)
-MOVED = PlanarMotion(np.array(1.2), np.array(0.1), np.array([3.0, 8.0]))
+MOVED = PlanarSimilarity(np.array(1.2), np.array(0.1), np.array([3.0, 8.0]))
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def test_an_examples_own_points_give_it_alone(example_set, row):
     np.testing.assert_allclose(shares, np.tile(np.eye(5)[row], (2, 1)), atol=1e-5)
 
 
-def test_a_mix_within_the_hull_is_found(example_set):
+def test_a_mixture_within_the_hull_is_found(example_set):
     truth = np.array([0.4, 0.3, 0.0, 0.2, 0.1])
     points = np.einsum("m,mnd->nd", truth, example_set.geometries)
     shares = coefficients(example_set, MOVED(points), distance_penalty=0.0)
@@ -65,7 +65,7 @@ def test_a_mix_within_the_hull_is_found(example_set):
     np.testing.assert_allclose(hull_distances(example_set, MOVED(points)), 0, atol=1e-2)
 
 
-def test_shares_are_a_partition(example_set, rng):
+def test_coefficients_sum_to_one(example_set, rng):
     points = example_set.neutral.points + 9 * rng.normal(size=example_set.neutral.points.shape)
     shares = coefficients(example_set, points)
     np.testing.assert_allclose(shares.sum(axis=1), 1, atol=1e-9)

@@ -1,4 +1,4 @@
-"""The closed form that motion propagation is measured against."""
+"""The closed form that motion propagation is compared with."""
 
 from __future__ import annotations
 
@@ -44,17 +44,19 @@ def test_is_the_conditional_mean_of_the_normal_distribution(rng):
     np.testing.assert_allclose(motion.infer(KNOWN, given).displacements.ravel(), expected)
 
 
-def test_what_is_usual_is_expected_when_the_usual_is_given(rng):
+def test_the_mean_given_the_mean_is_the_mean(rng):
     statistics = expressions(rng, noise=1.0)
     mean = statistics.mean(axis=0)
     found = ConditionalGaussian(statistics).infer(KNOWN, mean[KNOWN])
     np.testing.assert_allclose(found.displacements, mean, atol=1e-9)
 
 
-@pytest.mark.parametrize("way", [ConditionalGaussian, lambda rows: MotionPropagation(LAYOUT, rows)])
-def test_where_no_expression_was_seen_all_is_at_rest(way, rng):
+@pytest.mark.parametrize(
+    "model", [ConditionalGaussian, lambda rows: MotionPropagation(LAYOUT, rows)]
+)
+def test_statistics_without_motion_give_the_face_at_rest(model, rng):
     rest = np.tile(rng.normal(size=(POINTS, 2)), (3, 1, 1))
-    found = way(rest).infer(KNOWN, rest[0, KNOWN] + 2)
+    found = model(rest).infer(KNOWN, rest[0, KNOWN] + 2)
     np.testing.assert_allclose(found.displacements, rest[0], atol=1e-9)
 
 
@@ -73,7 +75,7 @@ def test_propagation_in_one_set_with_prior_comes_to_the_same(rng):
         np.testing.assert_allclose(found.errors[-1], expected.errors[0], atol=1e-5)
 
 
-def test_the_order_of_the_known_points_is_all_one(rng):
+def test_the_order_of_the_known_points_does_not_matter(rng):
     statistics = expressions(rng, noise=0.5)
     order = rng.permutation(len(KNOWN))
     motion, given = ConditionalGaussian(statistics), statistics[0, KNOWN]

@@ -1,4 +1,4 @@
-"""What points tell: of faces that were mirrored, moved or exchanged on purpose."""
+"""Points of faces that were mirrored, moved or exchanged on purpose."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.subregions import default_subregions
 from mien.errors import EstimationError, InputError
-from mien.numeric.planar_similarity import PlanarMotion
+from mien.numeric.planar_similarity import PlanarSimilarity
 from mien.synthesis.examples.example_set import Example, ExampleSet
 from mien.synthesis.inference.input_checks import (
     MIN_STATISTICS,
@@ -23,7 +23,7 @@ from mien.synthesis.inference.input_checks import (
 
 WIDTH, HEIGHT = 160, 200
 FACE = 100.0
-MOVED = PlanarMotion(np.array(1.1), np.array(0.15), np.array([-20.0, 4.0]))
+MOVED = PlanarSimilarity(np.array(1.1), np.array(0.15), np.array([-20.0, 4.0]))
 
 
 @pytest.fixture(scope="module")
@@ -33,14 +33,16 @@ def layout():
 
 @pytest.fixture(scope="module")
 def example_set(layout):
-    """A mean face that is 100 px wide, seen in 80 expressions of six smooth ways to move."""
+    """A mean face that is 100 px wide, with 80 expressions of six smooth modes."""
     rng = np.random.default_rng(8)
     neutral = (layout.template - layout.template.mean(0)) * FACE + [WIDTH / 2, HEIGHT / 2]
     photo = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     subregions = default_subregions(layout, neutral, (WIDTH, HEIGHT))
-    seen = np.stack([expression(layout, neutral, row) for row in rng.normal(0, 1, (80, 6))])
-    found = ExampleSet(layout, (Example("neutral", photo, neutral, ""),), 0, seen, subregions)
-    return replace(found, statistics=found.geometry(seen))
+    expressions = np.stack([expression(layout, neutral, row) for row in rng.normal(0, 1, (80, 6))])
+    found = ExampleSet(
+        layout, (Example("neutral", photo, neutral, ""),), 0, expressions, subregions
+    )
+    return replace(found, statistics=found.geometry(expressions))
 
 
 def expression(layout, neutral, amounts):
@@ -50,8 +52,8 @@ def expression(layout, neutral, amounts):
     moved = neutral.copy()
     for amount in amounts:
         wave, phase = rng.normal(0, 5, (2, 2)), rng.uniform(0, 6, 2)
-        ways = [np.sin(wave[i, 0] * x + wave[i, 1] * y + phase[i]) for i in (0, 1)]
-        moved += 1.5 * amount * np.stack(ways, axis=-1)
+        waves = [np.sin(wave[i, 0] * x + wave[i, 1] * y + phase[i]) for i in (0, 1)]
+        moved += 1.5 * amount * np.stack(waves, axis=-1)
     return moved
 
 
@@ -116,7 +118,7 @@ def test_a_head_that_moves_with_its_expression_has_moved(layout, example_set, co
     assert head_moved(example_set, known, points[known])
 
 
-def test_the_person_is_usual_and_another_one_is_odd(layout, example_set):
+def test_another_person_is_an_outlier_and_the_same_one_is_not(layout, example_set):
     neutral = example_set.neutral.points
     own = expression(layout, neutral, [1, -1, 0.5, 1, 0, 1])
     assert mahalanobis_rms(example_set, own) < OUTLIER_RMS / 2
@@ -132,12 +134,12 @@ def test_the_person_is_usual_and_another_one_is_odd(layout, example_set):
     )
 
 
-def test_a_few_expressions_do_not_tell_what_is_odd(example_set):
+def test_few_expressions_give_no_distance(example_set):
     few = replace(example_set, statistics=example_set.statistics[: MIN_STATISTICS - 1])
     assert mahalanobis_rms(few, few.neutral.points) is None
 
 
-def test_real_people_are_told_apart(shared, layout):
+def test_real_people_are_distinguished(shared, layout):
     """Frames of one clip, and two photos of another person."""
     from mien.capture.faces.detector import LandmarkDetector
     from mien.capture.images.photos import load_photo
@@ -155,8 +157,8 @@ def test_real_people_are_told_apart(shared, layout):
     photo = np.zeros((512, 512, 3), np.uint8)
     subregions = default_subregions(layout, found[0], (512, 512))
     examples = (Example("neutral", photo, found[0], ""),)
-    seen = ExampleSet(layout, examples, 0, np.stack(found[::2]), subregions)
-    seen = replace(seen, statistics=seen.geometry(seen.statistics))
-    own = np.array([mahalanobis_rms(seen, points) for points in found[1::2]])
+    clip_set = ExampleSet(layout, examples, 0, np.stack(found[::2]), subregions)
+    clip_set = replace(clip_set, statistics=clip_set.geometry(clip_set.statistics))
+    own = np.array([mahalanobis_rms(clip_set, points) for points in found[1::2]])
     assert (own < OUTLIER_RMS).mean() > 0.85
-    assert min(mahalanobis_rms(seen, points) for points in others) > OUTLIER_RMS
+    assert min(mahalanobis_rms(clip_set, points) for points in others) > OUTLIER_RMS

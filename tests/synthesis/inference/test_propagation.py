@@ -252,7 +252,7 @@ def test_a_layout_without_sets_is_refused(rng):
         lambda statistics: MotionPropagation(LAYOUT, statistics, components=4, **PATIENT),
     ],
 )
-def test_points_in_space_are_found_likewise(rng, model):
+def test_points_in_space_are_found_in_the_same_way(rng, model):
     """The flat expressions, turned in space, are found as they are in the plane."""
     statistics = expressions(rng) @ np.linalg.qr(rng.normal(size=(3, 3)))[0][:2]
     found = model(statistics).infer(KNOWN, statistics[3, KNOWN])

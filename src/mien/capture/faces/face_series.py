@@ -16,7 +16,7 @@ from mien.capture.faces.sharpness import face_sharpness
 from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
 from mien.capture.images.photos import Photo, load_photo
 from mien.capture.notes import gathered_notes
-from mien.capture.source_kind import kind_of_source
+from mien.capture.source_kind import SourceKind, kind_of_source
 from mien.capture.video.clip_notes import ClipNotes
 from mien.capture.video.frame_photos import fetch_frames, frame_name
 from mien.capture.video.frame_selection import FrameScores
@@ -24,15 +24,13 @@ from mien.capture.video.frames_ahead import frames_ahead
 from mien.capture.video.orientation import turn_upright
 from mien.capture.video.video import Video
 from mien.errors import EstimationError, InputError
-from mien.reading.names import plain_name
+from mien.progress import StepProgress
+from mien.reading.names import portable_name
 
-__all__ = ["FaceSeries", "Look", "find_faces", "load_pictures", "row_of", "rows_of"]
+__all__ = ["FaceSeries", "PictureCallback", "find_faces", "load_pictures", "row_of", "rows_of"]
 
-Look = Callable[[UInt8[Array, "h w 3"], Float[Array, "478 2"]], None]
+PictureCallback = Callable[[UInt8[Array, "h w 3"], Float[Array, "478 2"]], None]
 """Told of each picture that shows a face, in the series' order, and where its landmarks are."""
-
-Report = Callable[[int, int], None]
-"""Told the number of steps done and their total; 0: not known."""
 
 
 @dataclass(frozen=True)
@@ -78,14 +76,16 @@ def find_faces(
     detector: LandmarkDetector,
     *,
     max_side: int,
+    kind: SourceKind | None = None,
     face: int | None = None,
-    look: Look | None = None,
-    report: Report | None = None,
+    look: PictureCallback | None = None,
+    report: StepProgress | None = None,
 ) -> FaceSeries:
     """The face in every photo of a folder or in every frame of a video.
 
     Args:
         max_side: px; larger pictures are reduced to it.
+        kind: of the source, if it is known already.
         face: as for LandmarkDetector.detect, of photos; a video's is the largest.
         look: called with each picture that shows the face, as long as its pixels are there.
 
@@ -94,7 +94,7 @@ def find_faces(
         FileFormatError: as InputError.
         EstimationError: no picture shows a face.
     """
-    kind, source = kind_of_source(source), Path(source)
+    kind, source = kind or kind_of_source(source), Path(source)
     gathered = _Gathered(source, max_side, look or (lambda pixels, landmarks: None))
     if kind == "video":
         if face is not None:
@@ -106,7 +106,7 @@ def find_faces(
 
 
 def load_pictures(
-    series: FaceSeries, rows: Collection[int], report: Report | None = None
+    series: FaceSeries, rows: Collection[int], report: StepProgress | None = None
 ) -> Iterator[tuple[int, Photo]]:
     """The pictures of some rows of a series with the rows, in the series' order."""
     if not series.is_video:
@@ -129,7 +129,7 @@ def load_pictures(
 class _Gathered:
     """What was found so far."""
 
-    def __init__(self, source: Path, max_side: int, look: Look) -> None:
+    def __init__(self, source: Path, max_side: int, look: PictureCallback) -> None:
         self.source, self.max_side, self.look = source, max_side, look
         self.is_video = False
         self.files: list[Path] = []
@@ -142,7 +142,7 @@ class _Gathered:
         self.told: list[tuple[str, str]] = []
         self.quarters = 0
 
-    def read_video(self, detector: LandmarkDetector, report: Report | None) -> None:
+    def read_video(self, detector: LandmarkDetector, report: StepProgress | None) -> None:
         """Every frame, looked at once."""
         self.is_video = True
         video = Video(self.source)
@@ -161,11 +161,11 @@ class _Gathered:
                     self._add(frame_name(picture.frame), picture.frame, picture.pixels, found)
                 if report is not None:
                     report(picture.frame + 1, max(total, picture.frame + 1))
-        name = plain_name(self.source)
+        name = portable_name(self.source)
         self.notes += [f"{name}: {note}" for note in (*video.notes, *odd.notes)]
 
     def read_photos(
-        self, detector: LandmarkDetector, face: int | None, report: Report | None
+        self, detector: LandmarkDetector, face: int | None, report: StepProgress | None
     ) -> None:
         """Every photo, looked at as closely as `LandmarkDetector.detect` does."""
         folders = photo_files(self.source)
@@ -175,7 +175,9 @@ class _Gathered:
         for folder, paths in folders.items():
             self.notes += orphaned_annotations(paths)
             for path in paths:
-                name = plain_name(path) if len(folders) == 1 else f"{folder}/{plain_name(path)}"
+                name = (
+                    portable_name(path) if len(folders) == 1 else f"{folder}/{portable_name(path)}"
+                )
                 self._add_photo(name, number, path, detector, face)
                 number += 1
                 if report is not None:

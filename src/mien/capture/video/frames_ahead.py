@@ -20,7 +20,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Picture:
+class DecodedFrame:
     """One frame, converted.
 
     Attributes:
@@ -37,7 +37,7 @@ class Picture:
 @contextmanager
 def frames_ahead(
     video: Video, *, start: int = 0, max_side: int | None = None, ahead: int = AHEAD
-) -> Iterator[Iterator[Picture]]:
+) -> Iterator[Iterator[DecodedFrame]]:
     """The pictures of a video in order, while the block runs; at most `ahead` wait in memory.
 
     Decoding and converting run without Python's global lock, and so beside what the block does.
@@ -77,8 +77,8 @@ def _in_turn(items: Iterator[T], ahead: int, thread: Executor) -> Iterator[T]:
         yield item[0]
 
 
-def _pictures(video: Video, start: int, max_side: int | None) -> Generator[Picture]:
+def _pictures(video: Video, start: int, max_side: int | None) -> Generator[DecodedFrame]:
     with closing(video.frames()) as frames:
         for frame in frames:
             if frame.index >= start:
-                yield Picture(frame.index, frame.seconds, frame.pixels(max_side=max_side))
+                yield DecodedFrame(frame.index, frame.seconds, frame.pixels(max_side=max_side))

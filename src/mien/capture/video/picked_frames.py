@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,8 +11,7 @@ from mien.arrays import Array, Int, check_positive
 from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.faces.mediapipe_face import DetectedFace
 from mien.capture.faces.sharpness import face_sharpness
-from mien.capture.folder import NEUTRAL
-from mien.capture.images.photos import MAX_SIDE, Photo, shrunk
+from mien.capture.images.photos import DEFAULT_MAX_SIDE, Photo, shrunk
 from mien.capture.video.clip_notes import ClipNotes
 from mien.capture.video.expression_selection import choose_expressions, name_expressions
 from mien.capture.video.frame_photos import fetch_frames
@@ -21,6 +19,8 @@ from mien.capture.video.frame_selection import FrameScores, choose_frames
 from mien.capture.video.orientation import turn_upright
 from mien.capture.video.video import Video
 from mien.errors import EstimationError
+from mien.head import NEUTRAL
+from mien.progress import StepProgress
 
 MAX_SAMPLES = 240
 # Just under a tenth, so that rounded times of a 10 Hz clip do not skip frames.
@@ -48,8 +48,8 @@ def pick_frames(
     count: int = 7,
     expressions: int | None = None,
     detector: LandmarkDetector,
-    max_side: int = MAX_SIDE,
-    progress: Callable[[int, int], None] | None = None,
+    max_side: int = DEFAULT_MAX_SIDE,
+    progress: StepProgress | None = None,
 ) -> PickedFrames:
     """Sharp frames with diverse poses of the head at rest, and one of each other expression.
 
@@ -101,9 +101,7 @@ def _choose_rows(
     }
 
 
-def _two_passes(
-    progress: Callable[[int, int], None] | None, frames: int
-) -> Callable[[int, int], None]:
+def _two_passes(progress: StepProgress | None, frames: int) -> StepProgress:
     """Progress of pass 0 or 1 at a frame as (done, total) of both."""
     if progress is None:
         return lambda step, frame: None
@@ -115,9 +113,7 @@ def _two_passes(
     return report
 
 
-def _judge(
-    video: Video, detector: LandmarkDetector, report: Callable[[int, int], None]
-) -> FrameScores:
+def _judge(video: Video, detector: LandmarkDetector, report: StepProgress) -> FrameScores:
     """Scores of the frames, evenly spread in time, that show a face."""
     step = max(_SAMPLE_SECONDS, (video.facts().seconds or 0) / MAX_SAMPLES)
     rows: list[tuple[int, float, DetectedFace]] = []

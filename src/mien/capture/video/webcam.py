@@ -20,7 +20,7 @@ PATIENCE = 10.0
 _USUAL_RATE = 30.0
 
 
-class Capture(Protocol):
+class CaptureDevice(Protocol):
     """What is used of cv2.VideoCapture."""
 
     def read(self) -> tuple[bool, UInt8[Array, "h w 3"]]: ...
@@ -41,7 +41,7 @@ class _BgrShot:
         return np.ascontiguousarray(small[..., ::-1])
 
 
-def open_camera(number: int) -> Capture:
+def open_camera(number: int) -> CaptureDevice:
     """Camera 0, 1, … of this computer. Raises: InputError: there is none, or it is not ours."""
     import cv2
 
@@ -49,7 +49,7 @@ def open_camera(number: int) -> Capture:
     before = log.getLogLevel()
     log.setLogLevel(log.LOG_LEVEL_SILENT)
     try:
-        capture: Capture = cv2.VideoCapture(number)
+        capture: CaptureDevice = cv2.VideoCapture(number)
         if capture.isOpened():  # type: ignore[attr-defined]
             return capture
     finally:
@@ -77,7 +77,7 @@ class Webcam:
         self,
         number: int,
         *,
-        opened: Callable[[int], Capture] = open_camera,
+        opened: Callable[[int], CaptureDevice] = open_camera,
         clock: Callable[[], float] = time.monotonic,
         patience: float = PATIENCE,
     ) -> None:
@@ -116,7 +116,7 @@ class Webcam:
             self._ended = True
         self._thread.join(self._patience)
 
-    def _read(self, capture: Capture) -> None:
+    def _read(self, capture: CaptureDevice) -> None:
         """What the thread does: all calls of the camera, for it is not safe to share."""
         try:
             while not self._ended:
@@ -146,7 +146,7 @@ class Webcam:
             return self._newest if self._last_index() > index else None
 
 
-def _rate(capture: Capture) -> float:
+def _rate(capture: CaptureDevice) -> float:
     """Frames a second as the driver states them; many state nothing."""
     import cv2
 

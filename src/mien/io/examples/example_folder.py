@@ -1,4 +1,4 @@
-"""The example folder: what `mien examples` leaves (docs/example-folder.md)."""
+"""The example folder: what `mien examples` leaves (docs/reference/example-folder.md)."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.assets.subregions import Subregions, default_subregions
-from mien.errors import Broken, EstimationError, FileFormatError, InputError
+from mien.errors import DocumentError, EstimationError, FileFormatError, InputError
 from mien.io.examples.example_json import (
-    FORMAT,
+    EXAMPLES_FORMAT,
     STATISTICS,
-    VERSION,
     check_layout,
     examples_to_json,
     index_of,
@@ -28,12 +27,11 @@ from mien.io.examples.example_json import (
 )
 from mien.io.files.atomic import atomic_folder, check_folder_place
 from mien.io.files.image import encode_image, load_image
-from mien.io.files.leftovers import put_back
-from mien.io.head.head_json import is_inside
-from mien.numeric.kernels.threads import side_by_side
-from mien.reading.names import named_path
+from mien.io.files.leftovers import finish_replacement
+from mien.numeric.kernels.threads import run_concurrently
+from mien.reading.names import check_path, is_inside
 from mien.reading.npz import ArrayFile
-from mien.reading.strict_json import as_list, as_object, as_text, check_format, need, read_json
+from mien.reading.strict_json import as_list, as_object, as_text, errors_name_file, need, read_json
 from mien.synthesis.composition.example_warping import aligned_photos
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
@@ -41,39 +39,41 @@ __all__ = [
     "check_example_place",
     "is_example_folder",
     "load_examples",
-    "read_reasons",
+    "load_reasons",
+    "save_examples",
     "write_example_files",
-    "write_examples",
 ]
 
 INDEX, SUBREGIONS = "examples.json", "subregions.npz"
 
-_LEAST_PX = 0.01
+_MIN_EXTENT_PX = 0.01
 """Width and height of a face's points, at least."""
 
 _PAIR = re.compile(r"\[\n\s*([-+\d.e]+),\n\s*([-+\d.e]+)\n\s*\]")
-"""Two numbers, one a line: a place, which reads better in one line."""
+"""Two numbers, one a line: a point's, which read better in one line."""
 
 
-def write_examples(
+def save_examples(
     folder: str | Path, example_set: ExampleSet, *, why: Mapping[str, str] | None = None
 ) -> None:
     """Write an example folder in place of the one that is there, whole or not at all.
 
     Args:
+        folder: the place.
+        example_set: the examples.
         why: the reason for each example, by name.
 
     Raises:
         InputError: the place holds something else or cannot be written; a name that is no file's.
     """
-    with atomic_folder(folder, replaces=is_example_folder, stay=()) as temporary:
+    with atomic_folder(folder, replaces=is_example_folder, editable=()) as temporary:
         write_example_files(temporary, example_set, why=why)
 
 
 def write_example_files(
     folder: Path, example_set: ExampleSet, *, why: Mapping[str, str] | None = None
 ) -> None:
-    """As write_examples, but straight into an empty folder: for a caller that adds more to it."""
+    """As save_examples, but straight into an empty folder: for a caller that adds more to it."""
     for example in example_set.examples:
         if not is_inside(f"{example.name}.png") or "/" in example.name:
             raise InputError("example", "a name that can be a file's", repr(example.name))
@@ -84,8 +84,8 @@ def write_example_files(
         _write_png(folder / "textures" / f"{example.name}.png", texture)
     standard = example_set.examples[example_set.standard]
     _write_png(folder / "standard.png", standard.photo)
-    _write_png(folder / "subregions.png", _drawn(example_set.subregions))
-    if not _are_usual(example_set):
+    _write_png(folder / "subregions.png", _subregion_picture(example_set.subregions))
+    if not _are_default(example_set):
         np.savez_compressed(folder / SUBREGIONS, **_subregion_arrays(example_set.subregions))
     np.savez_compressed(folder / STATISTICS, geometries=example_set.statistics)
     text = json.dumps(examples_to_json(example_set, why or {}), indent=1, allow_nan=False)
@@ -94,20 +94,18 @@ def write_example_files(
 
 def is_example_folder(folder: Path) -> bool:
     """Whether mien made this folder, of whatever version."""
-    try:
-        return bool(read_json(Path(folder) / INDEX).get("format") == FORMAT)
-    except (FileFormatError, InputError):
-        return False
+    return EXAMPLES_FORMAT.is_in(folder / INDEX)
 
 
 def check_example_place(folder: str | Path, *, read: Iterable[str | Path] = ()) -> None:
     """Refuse a place for examples before the work is done.
 
     Args:
+        folder: the place.
         read: what the examples are made from, which must not lie in the folder.
 
     Raises:
-        InputError: bad input.
+        InputError: the place holds something else, holds what is read, cannot be written.
     """
     check_folder_place(folder, replaces=is_example_folder, read=read)
 
@@ -116,6 +114,7 @@ def load_examples(folder: str | Path, *, layout: FeatureLayout | None = None) ->
     """The examples in a folder, exactly as they were written.
 
     Args:
+        folder: that `mien examples` or `save_examples` wrote.
         layout: of the points; mien's own unless given.
 
     Raises:
@@ -123,7 +122,7 @@ def load_examples(folder: str | Path, *, layout: FeatureLayout | None = None) ->
         FileFormatError: something in it is missing, damaged, of another layout or newer than this
             program; the message names the file and the place in it.
     """
-    folder = named_path("examples", folder, "an example folder that `mien examples` made")
+    folder = check_path("examples", folder, "an example folder that `mien examples` made")
     layout = layout or load_feature_layout()
     path, data = _read_index(folder)
     try:
@@ -131,41 +130,36 @@ def load_examples(folder: str | Path, *, layout: FeatureLayout | None = None) ->
         # Made now, where the file's name is known; points in one place have none.
         _ = examples.geometries
         return examples
-    except Broken as broken:
-        raise FileFormatError(path, broken.problem, broken.place) from None
+    except DocumentError as error:
+        raise FileFormatError(path, error.problem, error.place) from None
     except (InputError, EstimationError) as error:
         raise FileFormatError(path, f"{error} (or the other files do not fit it)") from None
 
 
-def read_reasons(folder: str | Path) -> dict[str, str]:
+def load_reasons(folder: str | Path) -> dict[str, str]:
     """Why each example was chosen, by name. Raises: as load_examples."""
     path, data = _read_index(Path(folder))
-    try:
-        entries = as_list(need(data, "examples", ""), "examples")
-        return {
-            as_text(need(as_object(entry, place), "name", place), f"{place}.name"): as_text(
-                entry.get("why", ""), f"{place}.why"
-            )
-            for number, entry in enumerate(entries)
-            for place in (f"examples[{number}]",)
-        }
-    except Broken as broken:
-        raise FileFormatError(path, broken.problem, broken.place) from None
+    reasons = {}
+    with errors_name_file(path):
+        for index, entry in enumerate(as_list(need(data, "examples", ""), "examples")):
+            place = f"examples[{index}]"
+            name = as_text(need(as_object(entry, place), "name", place), f"{place}.name")
+            reasons[name] = as_text(entry.get("why", ""), f"{place}.why")
+    return reasons
 
 
 def _read_index(folder: Path) -> tuple[Path, dict[str, Any]]:
     path = folder / INDEX
-    put_back(folder)
+    if not folder.is_dir():
+        finish_replacement(folder)
     if not folder.is_dir():
         found = "a file" if folder.exists() else "nothing at that place"
         raise InputError(folder, "an example folder that `mien examples` made", found)
     if not path.exists():
         raise FileFormatError(path, "there is no such file; is this an example folder?")
     data = read_json(path)
-    try:
-        check_format(data, FORMAT, VERSION)
-    except Broken as broken:
-        raise FileFormatError(path, broken.problem, broken.place) from None
+    with errors_name_file(path):
+        EXAMPLES_FORMAT.check(data)
     return path, data
 
 
@@ -177,13 +171,13 @@ def _from_json(folder: Path, data: dict[str, Any], layout: FeatureLayout) -> Exa
         partial(_example, folder, entry, f"examples[{i}]", layout)
         for i, entry in enumerate(entries)
     ]
-    examples = tuple(side_by_side(*reading))
+    examples = tuple(run_concurrently(*reading))
     if not examples:
-        raise Broken("examples", "expected at least one, the neutral face; found none")
+        raise DocumentError("examples", "expected at least one, the neutral face; found none")
     names = [example.name for example in examples]
     if need(data, "neutral", "") != names[0]:
         problem = f"expected {names[0]!r}, the first example; found {str(data['neutral'])[:40]!r}"
-        raise Broken("neutral", problem)
+        raise DocumentError("neutral", problem)
     teeth = as_list(need(data, "teeth", ""), "teeth")
     standard = index_of(need(data, "standard", ""), "standard", names)
     return ExampleSet(
@@ -217,7 +211,7 @@ def _statistics(path: Path, layout: FeatureLayout) -> Float[Array, "N n 2"]:
         geometries = arrays.numbers("geometries", (None, len(layout.names), 2))
     if not len(geometries):
         raise FileFormatError(path, "expected at least one picture's points", "geometries")
-    flat = np.flatnonzero(np.ptp(geometries, axis=1).min(axis=1) < _LEAST_PX)
+    flat = np.flatnonzero(np.ptp(geometries, axis=1).min(axis=1) < _MIN_EXTENT_PX)
     if len(flat):
         problem = "expected points of a face, found all on one line or in one place"
         raise FileFormatError(path, problem, f"geometries[{flat[0]}]")
@@ -247,19 +241,19 @@ def _subregion_arrays(subregions: Subregions) -> dict[str, Any]:
     }
 
 
-def _are_usual(example_set: ExampleSet) -> bool:
+def _are_default(example_set: ExampleSet) -> bool:
     """Whether the subregions are those that mien draws, so that none need to be kept."""
     standard, ours = example_set.examples[example_set.standard], example_set.subregions
     height, width = standard.photo.shape[:2]
-    usual = default_subregions(example_set.layout, standard.points, (width, height))
+    default = default_subregions(example_set.layout, standard.points, (width, height))
     return (
-        usual.names == ours.names
-        and np.array_equal(usual.fades, ours.fades)
-        and all(map(np.array_equal, usual.members, ours.members))
+        default.names == ours.names
+        and np.array_equal(default.fades, ours.fades)
+        and all(map(np.array_equal, default.members, ours.members))
     )
 
 
-def _drawn(subregions: Subregions) -> UInt8[Array, "h w 4"]:
+def _subregion_picture(subregions: Subregions) -> UInt8[Array, "h w 4"]:
     """The subregions in colours that blend as they do."""
     turn = np.arange(len(subregions.names)) * 2.4
     colours = 128 + 100 * np.cos(turn[:, None] + np.array([0, 2.1, 4.2]))

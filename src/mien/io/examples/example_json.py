@@ -1,4 +1,4 @@
-"""`examples.json`: everything about examples that is no picture and no statistics."""
+"""`examples.json`: everything about examples that is neither pictures nor statistics."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.assets.feature_points import FeatureLayout
-from mien.errors import Broken
-from mien.io.head.head_json import is_inside
+from mien.errors import DocumentError
+from mien.reading.names import is_inside
 from mien.reading.strict_json import (
+    DocumentFormat,
     as_list,
     as_number,
     as_object,
@@ -22,13 +23,12 @@ from mien.reading.strict_json import (
 )
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
-FORMAT = "mien examples"
-VERSION = 1
+EXAMPLES_FORMAT = DocumentFormat("mien examples", 1)
 STATISTICS = "statistics.npz"
 
 
 def photo_file(example: Example) -> str:
-    """Where in the folder its photo lies."""
+    """Path of an example's photo within the folder."""
     return f"photos/{example.name}.png"
 
 
@@ -36,8 +36,7 @@ def examples_to_json(example_set: ExampleSet, why: Mapping[str, str]) -> dict[st
     """The contents of examples.json; why each example was chosen by its name."""
     names = [example.name for example in example_set.examples]
     return {
-        "format": FORMAT,
-        "version": VERSION,
+        **EXAMPLES_FORMAT.header,
         "layout": {
             "name": example_set.layout.name,
             "points": list(example_set.layout.names),
@@ -65,10 +64,10 @@ def examples_to_json(example_set: ExampleSet, why: Mapping[str, str]) -> dict[st
 
 
 def check_layout(data: dict[str, Any], layout: FeatureLayout) -> None:
-    """The points must be those of the layout, in its order: shares and statistics rely on it.
+    """The points must be those of the layout, in its order: coefficients and statistics rely on it.
 
     Raises:
-        Broken: other ones.
+        DocumentError: other ones.
     """
     name = as_text(need(data, "name", "layout"), "layout.name")
     points = as_list(need(data, "points", "layout"), "layout.points")
@@ -76,7 +75,7 @@ def check_layout(data: dict[str, Any], layout: FeatureLayout) -> None:
         return
     expected = f"the {len(layout.names)} points of {layout.name}"
     found = f"{len(points)} of {name[:40]}" + ", other ones" * (name == layout.name)
-    raise Broken("layout", f"expected {expected}, found {found}: run `mien examples` again")
+    raise DocumentError("layout", f"expected {expected}, found {found}: run `mien examples` again")
 
 
 def points_from_json(
@@ -85,10 +84,13 @@ def points_from_json(
     """(n, 2) px of points by name.
 
     Args:
+        value: the points in the document.
+        place: where they are in it.
+        layout: of the points.
         side: px, the photo's longer one; a point of a face that it cuts lies within one more.
 
     Raises:
-        Broken: one is missing, unknown or no place.
+        DocumentError: one is missing, unknown or no place.
     """
     named = as_object(value, place, layout.names)
     points = np.empty((len(layout.names), 2))
@@ -96,21 +98,23 @@ def points_from_json(
         where = join(place, name)
         pair = as_list(need(named, name, place), where)
         if len(pair) != 2:
-            raise Broken(where, f"expected [x, y] in px, found {len(pair)} numbers")
+            raise DocumentError(where, f"expected [x, y] in px, found {len(pair)} numbers")
         points[index] = [as_number(number, where, least=-side, most=2 * side) for number in pair]
     return points
 
 
 def index_of(name: object, place: str, names: list[str]) -> int:
-    """Which example bears a name. Raises: Broken: none; suggests the nearest."""
+    """Index of the example of a name. Raises: DocumentError: none; suggests the nearest."""
     if as_text(name, place) not in names:
-        raise Broken(place, unknown("example", str(name), names))
+        raise DocumentError(place, unknown("example", str(name), names))
     return names.index(str(name))
 
 
 def photo_from_json(data: Mapping[str, Any], place: str) -> str:
-    """Where an example's photo is, within the folder. Raises: Broken: it is not."""
+    """Path of an example's photo within the folder. Raises: DocumentError: one outside of it."""
     file = as_text(need(data, "photo", place), f"{place}.photo")
     if not is_inside(file):
-        raise Broken(f"{place}.photo", f"expected a file within the folder, found {file[:60]!r}")
+        raise DocumentError(
+            f"{place}.photo", f"expected a file within the folder, found {file[:60]!r}"
+        )
     return file

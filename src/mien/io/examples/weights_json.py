@@ -1,4 +1,4 @@
-"""W.json: which examples made which subregion of a picture, and in which share."""
+"""W.json: how much of which example is in each subregion of a picture."""
 
 from __future__ import annotations
 
@@ -11,31 +11,34 @@ import numpy as np
 
 from mien.arrays import Array, Float, check_array
 from mien.io.files.atomic import atomic_file
+from mien.reading.strict_json import DocumentFormat
 from mien.synthesis.examples.example_set import ExampleSet
 
-__all__ = ["FORMAT", "VERSION", "write_shares", "write_weights"]
+__all__ = ["WEIGHTS_FORMAT", "save_coefficients", "save_weights"]
 
-FORMAT, VERSION = "mien weights", 1
-_LEAST = 1e-4
-"""A smaller share changes no pixel by more than a fortieth of a grey level."""
+WEIGHTS_FORMAT = DocumentFormat("mien weights", 1)
+_NEGLIGIBLE = 1e-4
+"""A smaller coefficient changes no pixel by more than a fortieth of a grey level."""
 
 
-def write_weights(
+def save_weights(
     path: str | Path,
     examples: ExampleSet,
     coefficients: Float[Array, "r m"],
     hull_px: Float[Array, " r"],
 ) -> None:
-    """Writes the shares of each subregion, the greatest first, and how far it leaves the hull.
+    """Write the coefficients of each subregion, largest first, and how far it leaves the hull.
 
     Args:
+        path: the file.
+        examples: what the picture was made of.
         coefficients: as `Synthesis` has them.
         hull_px: as `Synthesis` has them.
 
     Raises:
         InputError: shapes, NaN, the place.
     """
-    write_shares(
+    save_coefficients(
         path,
         layout=examples.layout.name,
         sources={example.name: example.source for example in examples.examples},
@@ -45,7 +48,7 @@ def write_weights(
     )
 
 
-def write_shares(
+def save_coefficients(
     path: str | Path,
     *,
     layout: str,
@@ -57,20 +60,20 @@ def write_shares(
     """The same of examples of any kind.
 
     Args:
+        path: the file.
         layout: its name.
         sources: what each example was taken from, by name.
         subregions: their names.
-        coefficients: share of each example in each subregion.
-        hull: how far each subregion leaves the hull, by a key that says in which unit.
+        coefficients: of each example in each subregion.
+        hull: how far each subregion leaves the hull, by a key with its unit.
 
     Raises:
         InputError: shapes, NaN, the place.
     """
-    shares = check_array("coefficients", coefficients, (len(subregions), len(sources)))
-    rows = zip(subregions, shares, strict=True)
+    checked = check_array("coefficients", coefficients, (len(subregions), len(sources)))
+    rows = zip(subregions, checked, strict=True)
     data = {
-        "format": FORMAT,
-        "version": VERSION,
+        **WEIGHTS_FORMAT.header,
         "generator": f"mien {version('mien')}",
         "layout": layout,
         "examples": [{"name": name, "source": source} for name, source in sources.items()],
@@ -86,4 +89,4 @@ def write_shares(
 
 def _by_example(names: Sequence[str], row: Float[Array, " m"]) -> dict[str, float]:
     order = np.argsort(-np.abs(row), kind="stable")
-    return {names[i]: round(float(row[i]), 6) for i in order if abs(row[i]) >= _LEAST}
+    return {names[i]: round(float(row[i]), 6) for i in order if abs(row[i]) >= _NEGLIGIBLE}

@@ -15,17 +15,17 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from mien.errors import InputError
-from mien.io.files.leftovers import put_back, remove_leftovers, temporary_beside
+from mien.io.files.leftovers import finish_replacement, remove_leftovers, temporary_beside
 from mien.io.files.manifest import (
-    Seen,
+    Snapshot,
     keep_late_files,
-    keep_own_files,
-    read_manifest,
-    write_manifest,
+    keep_user_files,
+    load_manifest,
+    save_manifest,
 )
-from mien.reading.names import named_path
+from mien.reading.names import check_path
 
-# Failures of the place that is written to; any other is the caller's own and passes through.
+# Failures of the place that is written to; others are the caller's and pass through.
 _PLACE_ERRORS = {
     errno.EACCES,
     errno.EDQUOT,
@@ -55,7 +55,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
         InputError: a folder or a device is in the way, the place cannot be written.
     """
     target = _target(path)
-    with _placing(path, target):
+    with _place_errors(path, target):
         _check_no_folder(path, target)
         target.parent.mkdir(parents=True, exist_ok=True)
         remove_leftovers(target.parent)
@@ -77,7 +77,7 @@ def check_file_place(path: str | Path) -> None:
         InputError: as atomic_file.
     """
     target = _target(path)
-    with _placing(path, target):
+    with _place_errors(path, target):
         _check_no_folder(path, target)
         _try_to_write(target)
 
@@ -87,8 +87,8 @@ def check_files_apart(written: Iterable[str | Path], read: Iterable[str | Path] 
 
     Args:
         written: files that a run writes.
-        read: files that it reads; of a folder all that mien wrote there, or all that there is where
-            no list tells (mien.io.files.manifest).
+        read: files that it reads; of a folder all that mien wrote there by its manifest
+            (mien.io.files.manifest), all that is there where it has none.
 
     Raises:
         InputError: names the place.
@@ -99,17 +99,17 @@ def check_files_apart(written: Iterable[str | Path], read: Iterable[str | Path] 
             if _is_same(path, other):
                 found = "a file that is read or written as well"
                 raise InputError(path, "a place of its own", found)
-            if _belongs(path, other):
+            if _is_part_of(path, other):
                 raise InputError(path, "a place of its own", f"a file of {other}, which is read")
         taken.append(path)
 
 
 def check_side_file(path: str | Path, main: str | Path) -> None:
-    """Refuse a file that a result brings along and somebody else has put in its place.
+    """Refuse to write over somebody's file that has the name of one written beside a result.
 
     Args:
-        path: whose name nobody gave: it follows from the main file's.
-        main: where that is there, it brought along what lies beside it.
+        path: the file beside the result; its name follows from the result's.
+        main: the result; where it is there already, the file beside it is its own.
 
     Raises:
         InputError: names both.
@@ -124,7 +124,7 @@ def atomic_folder(
     *,
     replaces: Callable[[Path], bool],
     read: Iterable[str | Path] = (),
-    stay: Collection[str] | None = None,
+    editable: Collection[str] | None = None,
 ) -> Iterator[Path]:
     """A new folder that takes the place of `path` when the block ends without an error.
 
@@ -133,17 +133,18 @@ def atomic_folder(
 
     Args:
         path: the folder; those above it are made.
-        replaces: says of a folder already there whether it may be replaced. An empty one may.
-        read: what the run reads and must not lie in the folder.
-        stay: given, what mien did not write into the old folder is kept in the new one
-            (io.files.manifest); at these paths, which people may change, in its place.
+        replaces: whether a folder that is already there may be replaced. An empty one always may.
+        read: what the run reads, which must not lie in the folder.
+        editable: given, what mien did not write into the old folder is kept in the new one
+            (io.files.manifest): files at these paths, which people are meant to change, in their
+            places.
 
     Raises:
         InputError: as check_folder_place; the place cannot be written.
     """
     check_folder_place(path, replaces=replaces, read=read)
     target = _target(path)
-    with _placing(path, target):
+    with _place_errors(path, target):
         target.parent.mkdir(parents=True, exist_ok=True)
         remove_leftovers(target.parent)
         temporary = temporary_beside(target, "tmp")
@@ -152,12 +153,12 @@ def atomic_folder(
             yield temporary
             # What came there in the meantime must not be lost either.
             check_folder_place(path, replaces=replaces, read=read)
-            seen: Seen | None = None
-            if stay is not None:
-                write_manifest(temporary)
-                seen = keep_own_files(target, temporary, stay=stay)
+            before: Snapshot | None = None
+            if editable is not None:
+                save_manifest(temporary)
+                before = keep_user_files(target, temporary, editable=editable)
             _tree_to_disk(temporary)
-            _swap(temporary, target, seen)
+            _swap(temporary, target, before)
             _to_disk(target.parent)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
@@ -172,8 +173,8 @@ def check_folder_place(
         InputError: a file is in the way, a folder that holds something else or what is read.
     """
     target = _target(path)
-    put_back(target)
-    with _placing(path, target):
+    finish_replacement(target)
+    with _place_errors(path, target):
         if not target.exists():
             _try_to_write(target)
             return
@@ -213,8 +214,14 @@ def _try_to_write(target: Path) -> None:
         raise OSError(error.errno, os.strerror(error.errno or 0), str(target)) from error
 
 
-def _swap(new: Path, target: Path, seen: Seen | None) -> None:
-    """Args: seen: given, what is in the old folder and not among this is kept."""
+def _swap(new: Path, target: Path, before: Snapshot | None) -> None:
+    """Move the new folder in.
+
+    Args:
+        new: the new folder.
+        target: its place, and the old one's.
+        before: of the old folder; given, what has come there since is kept.
+    """
     if not target.exists():
         new.rename(target)
         return
@@ -225,14 +232,14 @@ def _swap(new: Path, target: Path, seen: Seen | None) -> None:
     except BaseException:
         old.rename(target)
         raise
-    if seen is not None:
-        keep_late_files(old, target, seen)
+    if before is not None:
+        keep_late_files(old, target, before)
     shutil.rmtree(old, ignore_errors=True)
 
 
 def _target(path: str | Path) -> Path:
     """Where a link leads: the link stays and what it names is replaced."""
-    return Path(os.path.realpath(named_path("output", path, "where a result goes")))
+    return Path(os.path.realpath(check_path("output", path, "where a result goes")))
 
 
 def _is_same(one: Path, other: Path) -> bool:
@@ -243,12 +250,12 @@ def _is_same(one: Path, other: Path) -> bool:
         return _target(one) == _target(other)
 
 
-def _belongs(path: Path, folder: Path) -> bool:
-    """Whether a file is one that a folder, which is read, is made of."""
+def _is_part_of(path: Path, folder: Path) -> bool:
+    """Whether a file is one that mien wrote in a folder that is read."""
     inside, above = _target(path), _target(folder)
     if not (above.is_dir() and inside.is_relative_to(above)):
         return False
-    manifest = read_manifest(above)
+    manifest = load_manifest(above)
     return inside.exists() if manifest is None else _name_in(inside, above) in manifest.files
 
 
@@ -264,9 +271,9 @@ def _tree_to_disk(folder: Path) -> None:
 
 
 def _to_disk(path: Path) -> None:
-    """Have the system write what it still holds, lest a power cut leave an empty file.
+    """Write to the disk what is still in memory: a power cut must leave no empty file.
 
-    Not every system can do that for folders, nor for somebody else's file that is only linked in.
+    Not every system can do that for folders, or for files of others that are linked in.
     """
     kind = path.lstat().st_mode
     if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):
@@ -283,7 +290,7 @@ def _to_disk(path: Path) -> None:
 
 
 @contextmanager
-def _placing(path: str | Path, target: Path) -> Iterator[None]:
+def _place_errors(path: str | Path, target: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:

@@ -9,13 +9,13 @@ from pathlib import Path
 from mien.arrays import Array, UInt8
 from mien.errors import InputError
 from mien.io.files.atomic import atomic_folder, check_folder_place
-from mien.io.files.image import encode_image, is_drawn_png
+from mien.io.files.image import encode_image, is_png_by_mien
 
 _OF_THE_SYSTEM = {".DS_Store", "Thumbs.db", "desktop.ini"}
-"""Left by file managers in every folder that they show; nobody misses them."""
+"""Left by file managers in every folder that they show; may be removed."""
 
 
-def write_frames(
+def save_frames(
     path: str | Path,
     frames: Iterable[UInt8[Array, "h w c"]],
     *,
@@ -55,7 +55,7 @@ def write_frames(
 
 
 def check_frames_place(path: str | Path, *, read: Iterable[str | Path] = ()) -> None:
-    """Refuse, before any frame is made, a folder that write_frames could not take.
+    """Refuse, before any frame is made, a folder that save_frames could not take.
 
     Raises:
         InputError: a file is in the way, a folder that holds other things or what is read.
@@ -68,4 +68,4 @@ def _holds_frames(folder: Path) -> bool:
     items = [item for item in folder.iterdir() if item.name not in _OF_THE_SYSTEM]
     names = [re.fullmatch(r"([\w-]+)_\d{6}\.png", item.name) for item in items]
     one_sequence = all(names) and len({match[1] for match in names if match}) <= 1
-    return one_sequence and all(map(is_drawn_png, items))
+    return one_sequence and all(map(is_png_by_mien, items))

@@ -1,4 +1,4 @@
-"""Pictures to and from files: one way for all of mien's output."""
+"""Pictures to and from files."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from mien.reading.files import is_missing
 _KINDS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
 _MODES = {3: "RGB", 4: "RGBA"}
 _SOFTWARE = "mien"
-"""Told in every PNG, as the standard provides for."""
+"""In every PNG, under the keyword that the standard has for it."""
 
 
 def image_kind(path: str | Path) -> str:
-    """ "PNG" or "JPEG", by suffix. Raises: InputError: any other."""
+    """The kind of a picture, "PNG" or "JPEG", by suffix. Raises: InputError: any other."""
     suffix = Path(path).suffix.lower()
     if suffix not in _KINDS:
         raise InputError(path, f"a name that ends in {', '.join(_KINDS)}", suffix or "no suffix")
@@ -33,6 +33,7 @@ def save_image(path: str | Path, pixels: UInt8[Array, "h w c"], *, quality: int 
     """Write a picture, whole or not at all; the suffix tells the kind.
 
     Args:
+        path: .png, .jpg or .jpeg.
         pixels: (h, w, 3) sRGB or (h, w, 4) with alpha last, not premultiplied.
         quality: of a JPEG, 1 to 100.
 
@@ -67,14 +68,14 @@ def encode_image(pixels: UInt8[Array, "h w c"], kind: str, *, quality: int = 95)
     else:
         from PIL.PngImagePlugin import PngInfo
 
-        told = PngInfo()
-        told.add_text("Software", _SOFTWARE)
+        info = PngInfo()
+        info.add_text("Software", _SOFTWARE)
         # A fifth of the time that the default level takes, for a tenth more bytes of a photograph.
-        image.save(stream, "PNG", compress_level=1, pnginfo=told)
+        image.save(stream, "PNG", compress_level=1, pnginfo=info)
     return stream.getvalue()
 
 
-def is_drawn_png(path: Path) -> bool:
+def is_png_by_mien(path: Path) -> bool:
     """Whether a file is a PNG that encode_image made, and no program has written since."""
     with suppress(OSError):
         if path.is_file():
@@ -86,7 +87,7 @@ def is_drawn_png(path: Path) -> bool:
 def load_image(path: str | Path) -> UInt8[Array, "h w 3"]:
     """An image that mien wrote, or that was painted in place of one, as (h, w, 3) sRGB.
 
-    Photos of unknown making are read by `mien.capture` instead.
+    Photos of any other origin are read by `mien.capture`.
 
     Raises:
         FileFormatError: missing, not a file, not such an image.

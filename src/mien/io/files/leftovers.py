@@ -1,7 +1,7 @@
-"""Temporary files beside results: their names, and what dead runs left of them.
+"""Temporary files beside results, and what is left of them by runs that were killed.
 
-A name tells the run that made it (a hash of the machine's name, the process), so that a run removes
-what dead ones left and nothing of those that still write.
+The name of one holds which run made it (a hash of the machine's name, the process), so that a run
+removes what killed ones left, and nothing of those that still write.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from pathlib import Path
 from typing import Literal
 
 Kind = Literal["tmp", "old"]
-"""A result that is being written; a folder that is moved aside while its successor moves in."""
+"""A result that is being written; an old folder that is moved aside while the new one moves in."""
 
-DAYS_OF_OTHERS = 1.0
-"""Whether a process of another machine lives cannot be asked: what it has left untouched for so
-long is a dead run's."""
+FOREIGN_RUN_DAYS = 1.0
+"""Whether a process of another machine is still running cannot be found out: a file of its that has
+not changed for so long is taken for a leftover."""
 
 _NAME = re.compile(
     r"\.mien-(?P<target>[0-9a-f]{8})-(?P<host>[0-9a-f]{8})-(?P<pid>\d+)-[0-9a-f]{8}"
@@ -43,24 +43,24 @@ def temporary_beside(target: Path, kind: Kind) -> Path:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove the temporary files of dead runs in a folder, once a run."""
+    """Remove the temporary files of killed runs in a folder, once a run."""
     if folder in _cleaned:
         return
     _cleaned.add(folder)
-    for path, match in _temporary_in(folder):
-        if match["kind"] == "tmp" and _is_dead(path, match):
+    for path, match in _temporary_files(folder):
+        if match["kind"] == "tmp" and _has_ended(path, match):
             _remove(path)
 
 
-def put_back(target: Path) -> None:
-    """Finish what a run began that died while it replaced this folder.
+def finish_replacement(target: Path) -> None:
+    """Finish the replacement of a folder by a run that was killed in the middle of it.
 
-    One that was moved aside comes back where its successor has not moved in, and is removed where
-    it has.
+    The old folder, which was moved aside, comes back unless the new one has moved in; then it is
+    removed.
     """
-    for path, match in _temporary_in(target.parent):
+    for path, match in _temporary_files(target.parent):
         aside = match["kind"] == "old" and match["target"] == _hash(target.name)
-        if aside and _is_dead(path, match):
+        if aside and _has_ended(path, match):
             if target.exists():
                 _remove(path)
             else:
@@ -68,28 +68,28 @@ def put_back(target: Path) -> None:
                     path.rename(target)
 
 
-def _temporary_in(folder: Path) -> list[tuple[Path, re.Match[str]]]:
+def _temporary_files(folder: Path) -> list[tuple[Path, re.Match[str]]]:
     with suppress(OSError):
         matches = [(folder / name, _NAME.fullmatch(name)) for name in os.listdir(folder)]
         return [(path, match) for path, match in matches if match]
     return []
 
 
-def _is_dead(path: Path, match: re.Match[str]) -> bool:
-    """Whether the run that made this file is over; when in doubt, it is not."""
+def _has_ended(path: Path, match: re.Match[str]) -> bool:
+    """Whether the run that made this file has ended; when in doubt, it has not."""
     try:
         touched = path.lstat().st_mtime
     except OSError:
         return False
     if match["host"] != _hash(socket.gethostname()):
-        return time.time() - touched > DAYS_OF_OTHERS * 86_400
+        return time.time() - touched > FOREIGN_RUN_DAYS * 86_400
     pid = int(match["pid"])
     if pid == os.getpid():
         return path.name not in _own
     import psutil
 
     try:
-        # A younger process has but inherited the number.
+        # The process that has the number now may be a younger one.
         return bool(psutil.Process(pid).create_time() > touched + _CLOCK_SLACK)
     except psutil.NoSuchProcess:
         return True

@@ -1,7 +1,7 @@
-"""What mien wrote in a folder, and what it did not: a folder that is replaced keeps the latter.
+"""Which files of a folder mien wrote: a folder that is replaced keeps all others.
 
 `.mien-files.json` in every folder that mien writes as a whole lists its files with size and
-checksum. A file that is not in the list, or is another one by now, is somebody's own.
+checksum. A file that is not in the list, or is not as it was written, is the user's.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from pathlib import Path
 from typing import Any
 
 from mien.errors import MienError
-from mien.reading.strict_json import read_json
+from mien.reading.strict_json import DocumentFormat, read_json
 
 MANIFEST = ".mien-files.json"
 KEPT = "kept"
 """Where files go that somebody changed, or whose name the new folder needs."""
 
-_FORMAT, _VERSION = "mien files", 1
+_FORMAT = DocumentFormat("mien files", 1)
 
 
-Seen = frozenset[tuple[str, int, int, int]]
-"""Files by path within a folder, with what tells whether another one came in their place."""
+Snapshot = frozenset[tuple[str, int, int, int]]
+"""The files of a folder at one time: path within it, inode, size and time of change."""
 
 
 @dataclass(frozen=True)
@@ -49,16 +49,16 @@ class Manifest:
         return False
 
 
-def write_manifest(folder: Path) -> None:
+def save_manifest(folder: Path) -> None:
     """List all files of a folder that mien has just written."""
     files = {name: [(folder / name).stat().st_size, _digest(folder / name)] for name in _in(folder)}
-    data: dict[str, Any] = {"format": _FORMAT, "version": _VERSION, "files": files}
+    data = _FORMAT.header | {"files": files}
     text = json.dumps(data, indent=0, sort_keys=True)
     (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
 
 
-def read_manifest(folder: Path) -> Manifest | None:
-    """None where there is none, or none that can be read: then nothing counts as mien's."""
+def load_manifest(folder: Path) -> Manifest | None:
+    """None where there is none, or none that can be read: then no file counts as mien's."""
     try:
         data = read_json(folder / MANIFEST)
         files = {str(name): (int(size), str(digest)) for name, (size, digest) in _files(data)}
@@ -67,57 +67,67 @@ def read_manifest(folder: Path) -> Manifest | None:
     return Manifest(files)
 
 
-def own_files(folder: Path) -> list[str]:
+def user_files(folder: Path) -> list[str]:
     """Files in a folder that mien did not write, or not as they are now, in order of their names.
 
-    Without a list that is all of them.
+    Without a manifest that is all of them.
     """
-    manifest = read_manifest(folder) or Manifest({})
+    manifest = load_manifest(folder) or Manifest({})
     return [name for name in _in(folder) if not manifest.describes(folder, name)]
 
 
-def keep_own_files(old: Path, new: Path, *, stay: Collection[str] = ()) -> Seen:
-    """Bring what is somebody's own from a folder into the one that will replace it.
+def keep_user_files(old: Path, new: Path, *, editable: Collection[str] = ()) -> Snapshot:
+    """Bring the user's files from a folder into the one that will replace it.
 
-    Files that mien does not know stay where they are, and so do empty folders; files that it wrote
+    Files that mien did not write keep their places, and so do empty folders; files that it wrote
     and somebody changed, or whose names the new folder has taken, go to `kept/`.
 
     Args:
         old: may be missing.
         new: with its manifest written.
-        stay: paths that people are meant to change: theirs stay, in the place of mien's.
+        editable: paths that people are meant to change: theirs stay, in the place of mien's.
 
     Returns:
-        what there was, for keep_late_files.
+        what was in the old folder, for keep_late_files.
     """
     if not old.exists():
         return frozenset()
-    seen = _seen(old)
-    known = (read_manifest(old) or Manifest({})).files
-    # Those that mien never knew come first: they have a right to their places, in `kept/`, too.
-    for name in sorted(own_files(old), key=known.__contains__):
-        _bring(old, new, name, changed=name in known, over=name in stay)
+    before = _snapshot(old)
+    known = (load_manifest(old) or Manifest({})).files
+    # Files that mien never wrote come first, so that they keep their places, in `kept/`, too.
+    for name in sorted(user_files(old), key=known.__contains__):
+        _bring(old, new, name, changed=name in known, replaces=name in editable)
     _keep_empty_folders(old, new)
-    return seen
+    return before
 
 
-def keep_late_files(old: Path, new: Path, seen: Seen) -> None:
-    """Bring what came into a folder, or changed there, while its own files were brought.
+def keep_late_files(old: Path, new: Path, before: Snapshot) -> None:
+    """Bring what came into a folder, or changed there, while its user's files were brought.
 
     Args:
         old: moved aside.
         new: in its place.
-        seen: by keep_own_files.
+        before: as keep_user_files returned it.
     """
-    late = {name for name, *_ in _seen(old) - seen}
-    for name in late.intersection(own_files(old)) if late else ():
+    late = {name for name, *_ in _snapshot(old) - before}
+    for name in late.intersection(user_files(old)) if late else ():
         _bring(old, new, name)
 
 
-def _bring(old: Path, new: Path, name: str, *, changed: bool = False, over: bool = False) -> None:
-    """Args: changed: it is mien's by name. over: it takes the place of mien's."""
+def _bring(
+    old: Path, new: Path, name: str, *, changed: bool = False, replaces: bool = False
+) -> None:
+    """Link a file of the old folder into the new one.
+
+    Args:
+        old: the old folder.
+        new: the new folder.
+        name: of the file.
+        changed: mien wrote it, and somebody changed it.
+        replaces: it takes the place of mien's.
+    """
     place = new / name
-    if over:
+    if replaces:
         place.unlink(missing_ok=True)
     elif changed or not _is_free(new, name):
         place = _kept_place(new, name)
@@ -155,8 +165,8 @@ def _kept_place(new: Path, name: str) -> Path:
 
 
 def kept_notes(folder: Path) -> tuple[str, ...]:
-    """A note on what in a folder is not mien's and was left, if there is any."""
-    names = own_files(folder)
+    """A note on the user's files in a folder, if there are any."""
+    names = user_files(folder)
     if not names:
         return ()
     more = ", ..." if len(names) > 5 else ""
@@ -164,7 +174,7 @@ def kept_notes(folder: Path) -> tuple[str, ...]:
 
 
 def _files(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    if data.get("format") != _FORMAT or not isinstance(data.get("files"), dict):
+    if data.get("format") != _FORMAT.name or not isinstance(data.get("files"), dict):
         raise ValueError
     return list(data["files"].items())
 
@@ -180,7 +190,7 @@ def _in(folder: Path) -> Iterator[str]:
                 yield path
 
 
-def _seen(folder: Path) -> Seen:
+def _snapshot(folder: Path) -> Snapshot:
     found = ((name, (folder / name).lstat()) for name in _in(folder))
     return frozenset((name, info.st_ino, info.st_size, info.st_mtime_ns) for name, info in found)
 
@@ -205,7 +215,7 @@ def _free(path: Path) -> Path:
 
 
 def _link(source: Path, place: Path) -> None:
-    """The same file under another name; a copy where the disk knows no links."""
+    """The same file under another name; a copy where the file system has no links."""
     try:
         os.link(source, place, follow_symlinks=False)
     except (OSError, NotImplementedError):

@@ -15,25 +15,25 @@ from mien.errors import InputError
 from mien.io.files.atomic import atomic_file, check_file_place
 
 # By container: the encoders that will do, the best first (a build of FFmpeg may lack libx264 for
-# its licence), and what the container itself is told. With its index moved to the front an .mp4
+# its licence), and the container's own options. With its index moved to the front an .mp4
 # starts to play before all of it has arrived.
 _ENCODERS = {".mp4": ("libx264", "libopenh264"), ".webm": ("libvpx-vp9",)}
 _CONTAINER_OPTIONS = {".mp4": {"movflags": "+faststart"}, ".webm": {}}
 
-# libvpx wants no bit rate where quality rules, and is slow where it is not told to hurry. With
-# alpha it must not use alternate reference frames, which the two streams would not share.
+# libvpx needs bit rate 0 for constant quality, and is slow by default. With alpha it must not use
+# alternate reference frames, which the two streams would not share.
 _TUNING = {"libvpx-vp9": {"b": "0", "cpu-used": "4", "row-mt": "1"}}
 _ALPHA_TUNING = {"auto-alt-ref": "0"}
 
-# By channels of a frame; a player that knows no alpha shows the same picture without.
+# By channels of a frame; a player without alpha shows the same picture without it.
 _PIXELS = {3: "yuv420p", 4: "yuva420p"}
 
 # FFmpeg's numbers: BT.709 for matrix, primaries and transfer; 16 to 235 for luma. Players take a
-# file that does not say for one or the other by its size, and shift its colours.
+# file without them for one or the other by its size, and shift its colours.
 _BT709, _LIMITED_RANGE = 1, 1
 
 
-def write_video(
+def save_video(
     path: str | Path,
     frames: Iterable[UInt8[Array, "h w c"]],
     fps: float,
@@ -46,7 +46,7 @@ def write_video(
         path: .mp4 (H.264) or .webm (VP9).
         frames: (h, w, 3) sRGB, or for .webm (h, w, 4) with alpha last, not premultiplied; all of
             one size, taken one at a time. An odd side is made even by repeating its last row or
-            column: colour at half resolution wants pairs.
+            column: colour at half resolution needs pairs.
         fps: frames a second.
         quality: the encoder's constant rate factor; lower is better and larger, 18 looks exact.
 
@@ -91,7 +91,7 @@ def write_video(
 
 
 def check_video_place(path: str | Path) -> None:
-    """Refuse, before any frame is made, a place that write_video would not take.
+    """Refuse, before any frame is made, a place that save_video would not take.
 
     Raises:
         InputError: another suffix, a place that cannot be written.
@@ -132,11 +132,11 @@ def _check_frame(
     height, width = check_image(name, pixels[..., :3] if channels == 4 else pixels).shape[:2]
     found = (height, width, channels)
     if expected not in (None, found):
-        raise InputError(name, f"{_told(expected)} as the first", _told(found))
+        raise InputError(name, f"{_size_text(expected)} as the first", _size_text(found))
     return found
 
 
-def _told(shape: tuple[int, int, int] | None) -> str:
+def _size_text(shape: tuple[int, int, int] | None) -> str:
     assert shape is not None
     height, width, channels = shape
     return f"{width}x{height} px{' with alpha' if channels == 4 else ''}"

@@ -1,4 +1,7 @@
-"""The head folder: what `mien build` leaves, readable without mien (docs/head-folder.md)."""
+"""The head folder: what `mien build` leaves, readable without mien.
+
+docs/reference/head-folder.md describes it.
+"""
 
 from __future__ import annotations
 
@@ -11,27 +14,26 @@ from typing import Any
 import numpy as np
 
 from mien.arrays import Array, UInt8
-from mien.errors import Broken, FileFormatError, InputError
+from mien.errors import DocumentError, FileFormatError, InputError
 from mien.head import NEUTRAL, Expression, Head
 from mien.io.files.atomic import atomic_folder, check_folder_place
 from mien.io.files.image import encode_image, load_image
-from mien.io.files.leftovers import put_back
-from mien.io.head.head_geometry import check_names, read_geometry
+from mien.io.files.leftovers import finish_replacement
+from mien.io.head.head_geometry import check_names, load_geometry
 from mien.io.head.head_json import (
-    FORMAT,
+    HEAD_FORMAT,
     Json,
-    check_header,
+    check_head_format,
     head_to_json,
-    is_inside,
-    motion_from_json,
     shading_from_json,
     texts_from_json,
-    texture_files,
+    texture_paths,
+    units_and_gaze_from_json,
     views_from_json,
 )
-from mien.io.head.region_masks import MASK_FILES, read_masks, write_masks
+from mien.io.head.region_masks import MASK_FILES, load_masks, save_masks
 from mien.limits import MAX_SIDE
-from mien.reading.names import named_path
+from mien.reading.names import check_path, is_inside
 from mien.reading.strict_json import as_names, as_object, as_text, join, need, read_json
 
 HEAD, GEOMETRY = "head.json", "geometry.npz"
@@ -50,6 +52,7 @@ def save_head(
 
     Args:
         head: what `load_head` gives back, to float32.
+        folder: the place.
         photos: name and (h, w, 3) pixels, orientation applied; taken one at a time.
         annotations: contents of `annotations/NAME.json` by NAME, as they were used.
 
@@ -68,12 +71,13 @@ def head_place(
     What mien did not write into the old one stays, masks that were painted, too.
 
     Args:
+        folder: the place.
         read: what the head is made from, which must not lie in the folder.
 
     Raises:
         InputError: as save_head.
     """
-    return atomic_folder(folder, replaces=is_head_folder, read=read, stay=MASK_FILES)
+    return atomic_folder(folder, replaces=is_head_folder, read=read, editable=MASK_FILES)
 
 
 def write_head(
@@ -88,7 +92,7 @@ def write_head(
     (folder / "textures").mkdir()
     for name, texture in head.textures.items():
         (folder / "textures" / f"{name}.png").write_bytes(encode_image(texture, "PNG"))
-    write_masks(folder, head.mesh, head.regions)
+    save_masks(folder, head.mesh, head.regions)
     for name, annotation in (annotations or {}).items():
         file = folder / "annotations" / f"{name}.json"
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -99,10 +103,7 @@ def write_head(
 
 def is_head_folder(folder: Path) -> bool:
     """Whether mien made this folder, of whatever version."""
-    try:
-        return bool(read_json(folder / HEAD).get("format") == FORMAT)
-    except (FileFormatError, InputError):
-        return False
+    return HEAD_FORMAT.is_in(folder / HEAD)
 
 
 def check_head_place(folder: str | Path, *, read: Iterable[str | Path] = ()) -> None:
@@ -118,19 +119,24 @@ def load_head(folder: str | Path) -> Head:
         FileFormatError: something in it is missing, damaged or newer than this program; the message
             names the file and the place in it.
     """
-    folder = named_path("head", folder, "a head folder that `mien build` made")
-    put_back(folder)
+    folder = check_path("head", folder, "a head folder that `mien build` made")
     if not folder.is_dir():
-        raise InputError(folder, "a head folder that `mien build` made", _what_is(folder))
+        finish_replacement(folder)
+    if not folder.is_dir():
+        raise InputError(
+            folder,
+            "a head folder that `mien build` made",
+            "a file" if folder.exists() else "nothing at that place",
+        )
     path = folder / HEAD
     if not path.exists():
         raise FileFormatError(path, "there is no such file; is this a head folder?")
     data = read_json(path)
     try:
-        check_header(data)
+        check_head_format(data)
         return _head_from(folder, data)
-    except Broken as broken:
-        raise FileFormatError(path, broken.problem, broken.place) from None
+    except DocumentError as error:
+        raise FileFormatError(path, error.problem, error.place) from None
     except InputError as error:
         raise FileFormatError(path, f"{error} (or the other files do not fit it)") from None
 
@@ -142,21 +148,21 @@ def _head_from(folder: Path, data: Json) -> Head:
         for name, item in expressions.items()
     }
     if NEUTRAL not in described:
-        raise Broken(f"expressions.{NEUTRAL}", "missing")
+        raise DocumentError(f"expressions.{NEUTRAL}", "missing")
     unit_names = as_names(need(data, "face_units", ""), "face_units")
     part_names = as_names(need(data, "parts", ""), "parts")
-    geometry = read_geometry(folder / GEOMETRY, tuple(described), part_names, len(unit_names))
+    geometry = load_geometry(folder / GEOMETRY, tuple(described), part_names, len(unit_names))
     check_names(geometry.mesh, unit_names)
     shapes = {
         name: Expression(
             vertices=geometry.shapes[name],
             views=views_from_json(item, place),
             texture=as_text(need(item, "texture", place), f"{place}.texture"),
-            **motion_from_json(item, place),
+            **units_and_gaze_from_json(item, place),
         )
         for name, (item, place) in described.items()
     }
-    files = texture_files(data)
+    files = texture_paths(data)
     textures = {name: load_image(folder / file) for name, file in files.items()}
     _check_textures(folder, files, textures, shapes)
     return Head(
@@ -167,7 +173,7 @@ def _head_from(folder: Path, data: Json) -> Head:
         unit_names=unit_names,
         unit_offsets=geometry.unit_offsets,
         textures=textures,
-        regions=read_masks(folder, geometry.mesh),
+        regions=load_masks(folder, geometry.mesh),
         shading=shading_from_json(data),
         left_out=texts_from_json(data, "left_out"),
         generator=as_text(need(data, "generator", ""), "generator"),
@@ -183,13 +189,13 @@ def _check_textures(
     """Those that are mixed must be of one size, neutral's among them.
 
     Raises:
-        FileFormatError: names the file. Broken: neutral has none.
+        FileFormatError: names the file. DocumentError: neutral has none.
     """
     neutral = textures.get(shapes[NEUTRAL].texture)
     if neutral is None:
         known = ", ".join(textures)[:60] or "none"
         problem = f"expected one of the textures, found {shapes[NEUTRAL].texture[:60]!r} of {known}"
-        raise Broken(f"expressions.{NEUTRAL}.texture", problem)
+        raise DocumentError(f"expressions.{NEUTRAL}.texture", problem)
     for name, pixels in textures.items():
         largest = max(pixels.shape[:2])
         if largest > MAX_SIDE:
@@ -238,7 +244,3 @@ def _write_photo(folder: Path, name: str, pixels: UInt8[Array, "h w 3"]) -> str:
 def _write_json(path: Path, data: Json) -> None:
     text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8")
-
-
-def _what_is(folder: Path) -> str:
-    return "a file" if folder.exists() else "nothing at that place"

@@ -1,4 +1,4 @@
-"""`geometry.npz` of a head folder, read with care: shapes that a head can have, and no others."""
+"""`geometry.npz` of a head folder, and checks that its shapes are those of a head."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.assets.generic import load_generic_head
-from mien.errors import Broken, FileFormatError
+from mien.errors import DocumentError, FileFormatError
 from mien.head import NEUTRAL
 from mien.limits import MAX_MM
 from mien.mesh import Mesh
 from mien.reading.npz import ArrayFile
 
-LEAST_MM = 0.01
-"""Spread of every part of the mesh in each direction, at least."""
+MIN_EXTENT_MM = 0.01
+"""Least extent of every part of the mesh in each direction: its smallest singular value."""
 _UV_TOLERANCE = 1e-3
 
 
@@ -38,14 +38,16 @@ class HeadGeometry:
     unit_offsets: Float[Array, "k v 3"]
 
 
-def read_geometry(
+def load_geometry(
     path: Path, expressions: Sequence[str], part_names: tuple[str, ...], units: int
 ) -> HeadGeometry:
     """The arrays in a file.
 
     Args:
+        path: the file.
         expressions: names, neutral among them.
-        units: how many.
+        part_names: of the mesh, in the order of their indices.
+        units: how many face units there are.
 
     Raises:
         FileFormatError: names the array: missing, of another kind or shape, an index or a number
@@ -84,14 +86,14 @@ def read_geometry(
 
 
 def _check_extent(path: Path, name: str, mesh: Mesh, vertices: Float[Array, "v 3"]) -> None:
-    """Raises: FileFormatError: a part that has shrunk to a point, a line or a plane."""
+    """Raises: FileFormatError: a part that lies in one point, line or plane."""
     for index, part in enumerate(mesh.part_names):
         corners = np.unique(mesh.triangles[mesh.part == index])
         if len(corners) < 4:
             continue
-        there = vertices[corners]
-        spread = np.linalg.svd(there - there.mean(axis=0), compute_uv=False)
-        if spread[-1] < LEAST_MM:
+        points = vertices[corners]
+        singular = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        if singular[-1] < MIN_EXTENT_MM:
             problem = (
                 f"expected a part with some extent, found {part!r} in one point, line or plane"
             )
@@ -99,10 +101,10 @@ def _check_extent(path: Path, name: str, mesh: Mesh, vertices: Float[Array, "v 3
 
 
 def check_names(mesh: Mesh, unit_names: tuple[str, ...]) -> None:
-    """Parts and units of a head of the generic topology are looked up by the generic names.
+    """Check that a head of the generic topology has the generic names of parts and units.
 
     Raises:
-        Broken: other ones, or in another order.
+        DocumentError: other ones, or in another order.
     """
     generic = load_generic_head()
     if mesh.vertices.shape != generic.mesh.vertices.shape:
@@ -115,4 +117,4 @@ def check_names(mesh: Mesh, unit_names: tuple[str, ...]) -> None:
             wrong = next((name for name in found if name not in expected), None)
             what = f"{wrong[:60]!r}" if wrong else f"{len(found)} of them, or another order"
             problem = f"expected the generic head's {len(expected)} in their order, found {what}"
-            raise Broken(place, problem)
+            raise DocumentError(place, problem)

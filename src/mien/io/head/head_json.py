@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
 
 from mien.arrays import Array
 from mien.camera import Camera
-from mien.errors import Broken, InputError
+from mien.errors import DocumentError, InputError
 from mien.head import SHADING, FittedView, Head
 from mien.limits import MAX_PHOTO_SIDE, UNIT_RANGE
+from mien.reading.names import is_inside
 from mien.reading.strict_json import (
+    DocumentFormat,
     as_array,
     as_choice,
     as_list,
@@ -21,13 +22,11 @@ from mien.reading.strict_json import (
     as_object,
     as_text,
     as_whole,
-    check_format,
     join,
     need,
 )
 
-FORMAT = "mien head"
-VERSION = 1
+HEAD_FORMAT = DocumentFormat("mien head", 1)
 
 UNITS = {
     "length": "mm",
@@ -45,11 +44,11 @@ def head_to_json(head: Head, photo_files: Mapping[str, str]) -> Json:
     """The contents of head.json.
 
     Args:
+        head: the head.
         photo_files: where in the folder each photo's pixels are, by the photo's name.
     """
     return {
-        "format": FORMAT,
-        "version": VERSION,
+        **HEAD_FORMAT.header,
         "generator": head.generator,
         "subject": head.subject,
         "units": dict(UNITS),
@@ -74,39 +73,34 @@ def head_to_json(head: Head, photo_files: Mapping[str, str]) -> Json:
     }
 
 
-def check_header(data: Json) -> None:
-    """Raises: Broken: not a head's, from a newer version of mien, in other units."""
-    check_format(data, FORMAT, VERSION)
+def check_head_format(data: Json) -> None:
+    """Raises: DocumentError: not a head's, from a newer version of mien, in other units."""
+    HEAD_FORMAT.check(data)
     units = as_object(need(data, "units", ""), "units")
-    for name, meant in UNITS.items():
-        as_choice(need(units, name, "units"), f"units.{name}", name, (meant,))
+    for name, expected in UNITS.items():
+        as_choice(need(units, name, "units"), f"units.{name}", name, (expected,))
 
 
 def texts_from_json(data: Json, key: str, place: str = "") -> dict[str, str]:
-    """data[key], an object whose values are text. Raises: Broken."""
+    """data[key], an object whose values are text. Raises: DocumentError."""
     texts = as_object(need(data, key, place), join(place, key))
     return {name: as_text(text, join(join(place, key), name)) for name, text in texts.items()}
 
 
-def texture_files(data: Json) -> dict[str, str]:
-    """Where in the folder each texture is. Raises: Broken: a path that leaves it."""
+def texture_paths(data: Json) -> dict[str, str]:
+    """Path of each texture within the folder. Raises: DocumentError: one outside of it."""
     files = texts_from_json(data, "textures")
     for name, path in files.items():
         if not is_inside(path):
             found = f"found {path[:60]!r}"
-            raise Broken(join("textures", name), f"expected a path inside the folder, {found}")
+            raise DocumentError(
+                join("textures", name), f"expected a path inside the folder, {found}"
+            )
     return files
 
 
-def is_inside(path: str) -> bool:
-    """Whether a relative path, with forward slashes, leads to somewhere below its folder."""
-    plain = PurePosixPath(path)
-    inside = bool(path) and not plain.is_absolute() and ".." not in plain.parts
-    return inside and not set(path) & set("\\\0")
-
-
 def views_from_json(data: Json, place: str) -> tuple[FittedView, ...]:
-    """The cameras of the expression at a place. Raises: Broken."""
+    """The cameras of the expression at a place. Raises: DocumentError."""
     place = f"{place}.cameras"
     return tuple(
         _view_from_json(as_object(item, f"{place}[{i}]"), f"{place}[{i}]")
@@ -114,10 +108,10 @@ def views_from_json(data: Json, place: str) -> tuple[FittedView, ...]:
     )
 
 
-def motion_from_json(data: Json, place: str) -> Json:
-    """Units and gaze of an expression, as fields of head.Expression; a head of an older mien
+def units_and_gaze_from_json(data: Json, place: str) -> Json:
+    """Units and gaze of an expression, as fields of head.Expression. Raises: DocumentError.
 
-    has none. Raises: Broken.
+    Heads of older versions of mien have none.
     """
     units = as_object(data.get("units", {}), f"{place}.units")
     low, high = UNIT_RANGE
@@ -143,7 +137,7 @@ def motion_from_json(data: Json, place: str) -> Json:
 
 
 def shading_from_json(data: Json) -> dict[str, tuple[float, float, float]]:
-    """Coefficients by part; a head of an older mien has the usual ones. Raises: Broken."""
+    """Coefficients by part, SHADING where there are none. Raises: DocumentError."""
     if "shading" not in data:
         return dict(SHADING)
     shading = as_object(data["shading"], "shading", SHADING)
@@ -197,4 +191,4 @@ def _view_from_json(item: Json, place: str) -> FittedView:
         )
     except InputError as error:
         problem = f"expected {error.expected}, found {error.got}"
-        raise Broken(f"{place}.{error.name}", problem) from None
+        raise DocumentError(f"{place}.{error.name}", problem) from None

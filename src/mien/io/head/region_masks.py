@@ -1,4 +1,4 @@
-"""Region masks as grey pictures in the layout of the texture, where an artist can paint them."""
+"""Region masks as grey pictures in the layout of the texture, which can be painted."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from mien.io.files.image import encode_image, load_image
 from mien.mesh import Mesh
 from mien.rig.regions import MASKS
 from mien.texture.atlas import atlas_surface, fill_gutters
-from mien.texture.surface import over_vertices
+from mien.texture.surface import interpolate_vertex_values
 
 FOLDER = "regions"
 MASK_FILES = frozenset(f"{FOLDER}/{name}.png" for name in MASKS)
-"""Within a head folder; people paint them."""
+"""Within a head folder; meant to be painted."""
 _SIDE = 1024
 
 
-def write_masks(folder: Path, mesh: Mesh, masks: dict[str, Float[Array, " v"]]) -> None:
+def save_masks(folder: Path, mesh: Mesh, masks: dict[str, Float[Array, " v"]]) -> None:
     """`regions/NAME.png` for each mask, (V,) in [0, 1]: white where the region is."""
     if not masks:
         return
     surface = atlas_surface(mesh, width=_SIDE, height=_SIDE)
-    values = over_vertices(surface, mesh, np.stack(list(masks.values()), axis=1))
+    values = interpolate_vertex_values(surface, mesh, np.stack(list(masks.values()), axis=1))
     values = fill_gutters(values, surface.mask)
     (folder / FOLDER).mkdir()
     for name, image in zip(masks, np.moveaxis(values, -1, 0), strict=True):
@@ -33,10 +33,10 @@ def write_masks(folder: Path, mesh: Mesh, masks: dict[str, Float[Array, " v"]]) 
         (folder / FOLDER / f"{name}.png").write_bytes(encode_image(picture, "PNG"))
 
 
-def read_masks(folder: Path, mesh: Mesh) -> dict[str, Float[Array, " v"]]:
+def load_masks(folder: Path, mesh: Mesh) -> dict[str, Float[Array, " v"]]:
     """The masks in a head folder, (V,) in [0, 1]; those whose file is missing are left out.
 
-    Pictures of any size will do, as long as they have the texture's layout.
+    Pictures may have any size, but must have the texture's layout.
 
     Raises:
         FileFormatError: a file that is no picture.
@@ -52,10 +52,12 @@ def _at_vertices(mesh: Mesh, picture: UInt8[Array, "h w 3"]) -> Float[Array, " v
     import cv2
 
     height, width = picture.shape[:2]
-    places = mesh.uvs * [width, -height] + [-0.5, height - 0.5]
+    pixels = mesh.uvs * [width, -height] + [-0.5, height - 0.5]
     grey = picture.mean(axis=2).astype(np.float32) / 255
-    x, y = np.ascontiguousarray(places.astype(np.float32).T)
-    at = cv2.remap(grey, x[None], y[None], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
-    corners, values = mesh.triangles.ravel(), at[mesh.uv_triangles.ravel()]
+    x, y = np.ascontiguousarray(pixels.astype(np.float32).T)
+    sampled = cv2.remap(grey, x[None], y[None], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[
+        0
+    ]
+    corners, values = mesh.triangles.ravel(), sampled[mesh.uv_triangles.ravel()]
     count = np.maximum(np.bincount(corners, minlength=len(mesh.vertices)), 1)
     return np.bincount(corners, values, minlength=len(mesh.vertices)) / count

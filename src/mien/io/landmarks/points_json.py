@@ -10,30 +10,33 @@ import numpy as np
 
 from mien.arrays import Array, Float, check_array
 from mien.assets.feature_points import FeatureLayout
-from mien.errors import Broken, FileFormatError, InputError
+from mien.errors import DocumentError, InputError
 from mien.io.files.atomic import atomic_file
 from mien.reading.strict_json import (
     as_list,
     as_number,
     as_object,
     as_text,
+    errors_name_file,
     join,
     need,
     read_json,
     unknown,
 )
 
-__all__ = ["read_points_json", "write_points_json"]
+__all__ = ["load_points_json", "save_points_json"]
 
 _KEYS = ("layout", "points")
 
 
-def read_points_json(
+def load_points_json(
     path: str | Path, layout: FeatureLayout, *, axes: int = 2
 ) -> dict[str, Float[Array, " d"]]:
     """The points in a file, by name, px: `{"layout": "zhang134", "points": {"NAME": [X, Y]}}`.
 
     Args:
+        path: the file.
+        layout: of the points.
         axes: 3 for points of a head: [X, Y, Z] mm, head space.
 
     Raises:
@@ -41,18 +44,19 @@ def read_points_json(
         FileFormatError: not JSON, another layout's points, an unknown name (suggests the nearest),
             anything but so many finite numbers a point, no point at all; says where.
     """
-    try:
-        return _points(as_object(read_json(path), "", _KEYS), layout, axes)
-    except Broken as broken:
-        raise FileFormatError(path, broken.problem, broken.place) from None
+    data = read_json(path)
+    with errors_name_file(path):
+        return _points(as_object(data, "", _KEYS), layout, axes)
 
 
-def write_points_json(
+def save_points_json(
     path: str | Path, layout: FeatureLayout, points: Mapping[str, Float[Array, " d"]]
 ) -> None:
-    """Writes some or all points of a layout, to a thousandth of a pixel or of a mm.
+    """Write some or all points of a layout, to a thousandth of a pixel or of a mm.
 
     Args:
+        path: the file.
+        layout: of the points.
         points: by name, two numbers each, or three each.
 
     Raises:
@@ -78,19 +82,19 @@ def _points(
 ) -> dict[str, Float[Array, " d"]]:
     name = as_text(need(data, "layout", ""), "layout")
     if name != layout.name:
-        raise Broken("layout", f"expected {layout.name!r}, found {name[:40]!r}")
+        raise DocumentError("layout", f"expected {layout.name!r}, found {name[:40]!r}")
     rows = as_object(need(data, "points", ""), "points")
     if not rows:
-        raise Broken("points", "expected at least one point, found none")
-    return {name: _place(name, row, layout, axes) for name, row in rows.items()}
+        raise DocumentError("points", "expected at least one point, found none")
+    return {name: _point(name, row, layout, axes) for name, row in rows.items()}
 
 
-def _place(name: str, row: object, layout: FeatureLayout, axes: int) -> Float[Array, " d"]:
+def _point(name: str, row: object, layout: FeatureLayout, axes: int) -> Float[Array, " d"]:
     place = join("points", name)
     if name not in layout.names:
-        raise Broken(place, unknown("point", name, layout.names))
+        raise DocumentError(place, unknown("point", name, layout.names))
     numbers = as_list(row, place)
     if len(numbers) != axes:
         expected = "x and y" if axes == 2 else "x, y and z"
-        raise Broken(place, f"expected {expected}, found {len(numbers)} numbers")
+        raise DocumentError(place, f"expected {expected}, found {len(numbers)} numbers")
     return np.array([as_number(number, place) for number in numbers])

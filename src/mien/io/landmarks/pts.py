@@ -1,4 +1,4 @@
-"""Landmark files of iBUG, `.pts`, and what their 68 points share with zhang134."""
+"""Landmark files of iBUG, `.pts`, and which of their 68 points are feature points of zhang134."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from mien.limits import MAX_POINTS_BYTES
 from mien.reading.files import read_text
 from mien.reading.text_numbers import Numbers
 
-__all__ = ["IBUG_SHARED", "points_from_ibug", "points_to_ibug", "read_pts", "write_pts"]
+__all__ = ["IBUG_SHARED", "load_pts", "points_from_ibug", "points_to_ibug", "save_pts"]
 
 IBUG_COUNT = 68
 _FILE = re.compile(r"\s*version:\s*1(?:\.0*)?\s+n_points:\s*(\d{1,5})\s*\{([^{}]*)\}\s*", re.ASCII)
-FIRST_CENTRE = 1.0
-"""iBUG counts as Matlab does, the first pixel's centre at (1, 1); here it is at (0.5, 0.5)."""
+FIRST_PIXEL_CENTRE = 1.0
+"""In iBUG's files, as in Matlab, the first pixel's centre is at (1, 1); here at (0.5, 0.5)."""
 
 IBUG_SHARED = {
     8: "menton",
@@ -48,9 +48,9 @@ IBUG_SHARED = {
     64: "left_inner_mouth_corner",
     66: "lower_lip_inner",
 }
-"""The points that are the same on both, by iBUG's number, counted from 0."""
+"""Names of the points that both have, by iBUG's number, counted from 0."""
 
-# The others lie on these lines of both, evenly between the shared points.
+# The other points lie on these lines, which both have, evenly between the shared points.
 _RIGHT_LINES = {
     (0, 1, 2, 3, 4, 5, 6, 7, 8): "temple jaw.2 jaw.1 jaw.0 =menton",
     (27, 28, 29, 30): "=nose_root =nose_bridge =nose_tip",
@@ -63,7 +63,7 @@ _RIGHT_LINES = {
     (60, 61, 62): "inner_mouth_corner upper_lip_inner.1 upper_lip_inner.0 =upper_lip_inner",
     (60, 67, 66): "inner_mouth_corner lower_lip_inner.1 lower_lip_inner.0 =lower_lip_inner",
 }
-_PARTNER = {
+_MIRRORED = {
     **{i: 16 - i for i in range(17)},
     **dict(zip((27, 28, 29, 30), (27, 28, 29, 30), strict=True)),
     **dict(zip((36, 37, 38, 39, 40, 41), (45, 44, 43, 42, 47, 46), strict=True)),
@@ -72,7 +72,7 @@ _PARTNER = {
 }
 
 
-def read_pts(path: str | Path) -> Float[Array, "n 2"]:
+def load_pts(path: str | Path) -> Float[Array, "n 2"]:
     """The points of a file, (N, 2) px, the first pixel's centre at (0.5, 0.5).
 
     Raises:
@@ -80,12 +80,12 @@ def read_pts(path: str | Path) -> Float[Array, "n 2"]:
         FileFormatError: no such file; says where.
     """
     text = read_text(path, MAX_POINTS_BYTES, "an iBUG .pts file")
-    # What stands behind # or // is a comment; the line itself stays, for the count.
+    # Comments begin with # or //; their lines stay, so that line numbers in errors are right.
     found = _FILE.fullmatch(re.sub(r"(#|//).*", "", text))
     if found is None:
         expected = "'version: 1', 'n_points: 68' and the points between { and }"
         raise FileFormatError(path, f"expected {expected}")
-    # Blank lines keep the count of lines.
+    # As many blank lines as there were lines before, for the same reason.
     body = "\n" * text[: found.start(2)].count("\n") + found[2]
     numbers = Numbers(path, "points", body)
     points = []
@@ -94,16 +94,16 @@ def read_pts(path: str | Path) -> Float[Array, "n 2"]:
     if len(points) != int(found[1]) or not points:
         problem = f"n_points says {int(found[1])}, found {len(points)} points"
         raise FileFormatError(path, problem)
-    return np.array(points) - FIRST_CENTRE + 0.5
+    return np.array(points) - FIRST_PIXEL_CENTRE + 0.5
 
 
-def write_pts(path: str | Path, points: Float[Array, "n 2"]) -> None:
-    """Writes (N, 2) px, the first pixel's centre at (0.5, 0.5), to a thousandth of a pixel.
+def save_pts(path: str | Path, points: Float[Array, "n 2"]) -> None:
+    """Write (N, 2) px, the first pixel's centre at (0.5, 0.5), to a thousandth of a pixel.
 
     Raises:
-        InputError: shape, NaN, the place.
+        InputError: shape, NaN, a place that cannot be written.
     """
-    shifted = check_array("points", points, (None, 2)) - 0.5 + FIRST_CENTRE
+    shifted = check_array("points", points, (None, 2)) - 0.5 + FIRST_PIXEL_CENTRE
     rows = [f"{x:.3f} {y:.3f}" for x, y in shifted]
     text = "\n".join(["version: 1", f"n_points: {len(rows)}", "{", *rows, "}"])
     with atomic_file(path) as temporary:
@@ -119,7 +119,7 @@ def points_from_ibug(
 
 
 def points_to_ibug(layout: FeatureLayout, points: Float[Array, "n 2"]) -> Float[Array, "68 2"]:
-    """iBUG's 68 points: those shared, and the others evenly along the lines that both draw.
+    """The 68 points of iBUG: those shared, and the others evenly along the lines that both have.
 
     Raises:
         InputError: shape, NaN, a layout without the points that this needs.
@@ -128,17 +128,17 @@ def points_to_ibug(layout: FeatureLayout, points: Float[Array, "n 2"]) -> Float[
     ibug = np.empty((IBUG_COUNT, 2))
     for side in ("right", "left"):
         for numbers, names in _RIGHT_LINES.items():
-            marks = [n[1:] if n[0] == "=" else f"{side}_{n}" for n in names.split()]
-            line = points[[layout.index(name) for name in marks]]
-            chosen = numbers if side == "right" else [_PARTNER[number] for number in numbers]
-            ibug[list(chosen)] = _evenly(line, len(numbers))
+            sided = [n[1:] if n[0] == "=" else f"{side}_{n}" for n in names.split()]
+            line = points[[layout.index(name) for name in sided]]
+            rows = numbers if side == "right" else [_MIRRORED[number] for number in numbers]
+            ibug[list(rows)] = _resampled(line, len(numbers))
     for number, name in IBUG_SHARED.items():
         ibug[number] = points[layout.index(name)]
     return ibug
 
 
-def _evenly(line: Float[Array, "p 2"], count: int) -> Float[Array, "c 2"]:
-    """So many points on a polyline at equal distances along it, both ends among them."""
+def _resampled(line: Float[Array, "p 2"], count: int) -> Float[Array, "c 2"]:
+    """(C, 2) points at equal distances along a polyline, both ends among them."""
     lengths = np.append(0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
-    wanted = np.linspace(0, lengths[-1], count)
-    return np.column_stack([np.interp(wanted, lengths, line[:, axis]) for axis in (0, 1)])
+    targets = np.linspace(0, lengths[-1], count)
+    return np.column_stack([np.interp(targets, lengths, line[:, axis]) for axis in (0, 1)])

@@ -15,7 +15,7 @@ from mien.io.files.atomic import atomic_file
 from mien.io.landmarks.tem_templates import TEMPLATES
 from mien.reading.text_numbers import Numbers
 
-__all__ = ["Delineation", "TemLine", "points_from_tem", "points_to_tem", "read_tem", "write_tem"]
+__all__ = ["Delineation", "TemLine", "load_tem", "points_from_tem", "points_to_tem", "save_tem"]
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Delineation:
     lines: tuple[TemLine, ...]
 
 
-def read_tem(path: str | Path) -> Delineation:
+def load_tem(path: str | Path) -> Delineation:
     """The delineation in a file.
 
     Raises:
@@ -61,11 +61,12 @@ def _line(numbers: Numbers, count: int) -> TemLine:
     return TemLine(closed, np.array(points))
 
 
-def write_tem(path: str | Path, delineation: Delineation) -> None:
-    """Writes a delineation, to a thousandth of a pixel.
+def save_tem(path: str | Path, delineation: Delineation) -> None:
+    """Write a delineation, to a thousandth of a pixel.
 
     Raises:
-        InputError: shapes, NaN, a line through a point that is not there, the place.
+        InputError: shapes, NaN, a line through a point that is not there, a place that cannot be
+            written.
     """
     points = check_array("points", delineation.points, (None, 2))
     rows = [str(len(points)), *(f"{x:.3f}\t{y:.3f}" for x, y in points)]
@@ -96,9 +97,11 @@ def points_to_tem(layout: FeatureLayout, points: Float[Array, "n 2"]) -> Delinea
 def points_from_tem(
     delineation: Delineation, layout: FeatureLayout, name: str | Path = "delineation"
 ) -> dict[str, Float[Array, " 2"]]:
-    """The points of a layout that a delineation holds: all of its own, or those shared with others.
+    """The points of a layout in a delineation: all, or those shared with another template.
 
     Args:
+        delineation: as load_tem returns it.
+        layout: of the points wanted.
         name: of the file, for messages.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What zhang134 shares with the templates that `.tem` files are drawn over elsewhere."""
+"""Points of zhang134 that the usual templates of `.tem` files have, too."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ __all__ = ["TEMPLATES", "TemTemplate"]
 
 @dataclass(frozen=True)
 class TemTemplate:
-    """A template, told by how many points it has.
+    """A template; which one a file has is known by its number of points.
 
     Attributes:
-        origin: whose it is.
-        shared: by the name in zhang134, the number of the point that marks the same place.
+        origin: who made it.
+        shared: number of the point at the same place, by the name in zhang134.
     """
 
     origin: str
@@ -140,11 +140,11 @@ TEMPLATES = {
     106: TemTemplate("Face++", _FACE_PP_106),
     189: TemTemplate("Face Research Lab", _FACE_RESEARCH_LAB),
 }
-"""By the number of points: those that WebMorph draws by itself, and its own, marked by hand.
+"""By the number of points: those that WebMorph finds by itself, and its own, marked by hand.
 
 Points of these and the detector agree, on the mean of a pair over four to six photos, to 3.4 % of
-the distance between the outer corners of the eyes; the menton of Face++ to 5 %. What looks alike
-but lies 4 to 10 % apart is left out: the middle of brows, rims of nostrils, the jaw.
+the distance between the outer corners of the eyes; the menton of Face++ to 5 %. Points of similar
+names that lie 4 to 10 % apart are left out: the middle of brows, rims of nostrils, the jaw.
 
 Of 7 and 70 points are those of webmorphR.dlib, which puts two for the eyes before dlib's own: of
 70 the means of the lids' points, of 7 those of the eyes' corners, which are no pupils.

@@ -19,10 +19,10 @@ import numpy as np
 from mien.errors import InputError
 from mien.io.live.live_link import EYE_COLUMNS, HEAD_COLUMNS, TIMECODE_RATE, UNITS
 
-PORT = 11111
+LIVE_LINK_PORT = 11111
 """Where Unreal listens."""
 
-VERSION = 6
+PACKET_VERSION = 6
 
 _SWAPPED = {"jawRight": "jawLeft", "jawLeft": "jawRight"}
 _SWAPPED |= {"mouthRight": "mouthLeft", "mouthLeft": "mouthRight"}
@@ -41,8 +41,8 @@ class Packet:
     Attributes:
         subject: the name under which Unreal lists it.
         seconds: its time; the app counts from midnight.
-        values: by NAMES, radians and weights, as mien.io.live.live_link.values_of gives them;
-            nothing where the app saw no face.
+        values: by NAMES, radians and weights, as `live_link_values` gives them; none where the app
+            saw no face.
         device: which phone; made from the subject unless given.
     """
 
@@ -69,7 +69,7 @@ def encode(packet: Packet) -> bytes:
     frame, thousandths = divmod(round(packet.seconds * TIMECODE_RATE * 1000), 1000)
     return b"".join(
         (
-            bytes([VERSION]),
+            bytes([PACKET_VERSION]),
             _text("device", device),
             _text("subject", packet.subject),
             _TIME.pack(frame, thousandths / 1000, TIMECODE_RATE, 1),
@@ -87,7 +87,7 @@ def decode(data: bytes) -> Packet:
     """
     reader = _Reader(data)
     (version,) = reader.take(1)
-    reader.check(version == VERSION, f"version {VERSION}", version)
+    reader.check(version == PACKET_VERSION, f"version {PACKET_VERSION}", version)
     device, subject = reader.text(), reader.text()
     frame, part, rate, divisor = _TIME.unpack(reader.take(_TIME.size))
     reader.check(rate > 0 and divisor > 0, "a frame rate above 0", f"{rate}/{divisor}")
@@ -104,19 +104,19 @@ def decode(data: bytes) -> Packet:
 
 @dataclass
 class _Reader:
-    """Bytes from their beginning to their end."""
+    """Reads bytes one after the other."""
 
     data: bytes
-    place: int = 0
+    position: int = 0
 
     @property
     def rest(self) -> bytes:
-        return self.data[self.place :]
+        return self.data[self.position :]
 
     def take(self, length: int) -> bytes:
         part = self.rest[:length]
         self.check(len(part) == length, f"{length} bytes", len(part))
-        self.place += length
+        self.position += length
         return part
 
     def text(self) -> str:
@@ -124,9 +124,9 @@ class _Reader:
         self.check(0 <= length <= _MAX_NAME, f"a text of at most {_MAX_NAME} bytes", length)
         return self.take(length).decode(errors="replace")
 
-    def check(self, fine: bool, expected: str, found: object) -> None:
-        if not fine:
-            raise InputError(f"Live Link packet at byte {self.place}", expected, found)
+    def check(self, valid: bool, expected: str, found: object) -> None:
+        if not valid:
+            raise InputError(f"Live Link packet at byte {self.position}", expected, found)
 
 
 def _text(name: str, text: str) -> bytes:

@@ -10,7 +10,7 @@ VMagicMirror and receivers for Unity, Unreal, Godot and Blender understand. A fr
     /VMC/Ext/Blend/Apply
 
 Units are called as the clips of "perfect sync" avatars are: ARKit's names with a capital, which
-counts. Positions of bones belong to the avatar's own skeleton, which a sender cannot know: 0.
+counts. Positions of bones belong to the avatar's own skeleton, which the sender does not have: 0.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from collections.abc import Iterator, Mapping
 
 from mien.animate.timeline import Moment
 from mien.arrays import Array, Float
-from mien.io.live.live_link import column_of, unit_weights
+from mien.io.live.live_link import column_name, weights_with_gaze
 from mien.rig.state import FaceState, Gaze
 
-PORT = 39539
-"""Where receivers listen, unless they are told another."""
+VMC_PORT = 39539
+"""Where receivers listen by default."""
 
 _LOADED, _CALIBRATED, _NORMAL_MODE = 1, 3, 0
 _EYES = ("LeftEye", "RightEye")
-_PLACE = (0.0, 0.0, 0.0)
+_POSITION = (0.0, 0.0, 0.0)
 
 _Message = tuple[str, tuple[str | int | float, ...]]
 
@@ -36,17 +36,18 @@ def encode_face(moment: Moment, given: Mapping[str, float]) -> bytes:
     """The bundle of a frame in which the face was found.
 
     Args:
-        given: weights of the units that stand for the moment's face.
+        moment: the frame.
+        given: weights by unit for the moment's face.
 
     Raises:
         InputError: a unit that is not one of ARKit's 52.
     """
-    return _bundle([*_alive(moment.time, tracked=True), *_bones(moment), *_blends(moment, given)])
+    return _bundle([*_status(moment.time, tracked=True), *_bones(moment), *_blends(moment, given)])
 
 
 def encode_lost(seconds: float) -> bytes:
-    """The bundle of a frame in which it was not: the sender lives, the avatar stays as it is."""
-    return _bundle(list(_alive(seconds, tracked=False)))
+    """The bundle of a frame in which it was not: the avatar stays as it is."""
+    return _bundle(list(_status(seconds, tracked=False)))
 
 
 def unity_quaternion(rotation: Float[Array, "3 3"]) -> tuple[float, float, float, float]:
@@ -62,7 +63,7 @@ def unity_quaternion(rotation: Float[Array, "3 3"]) -> tuple[float, float, float
     return x, -y, -z, w
 
 
-def _alive(seconds: float, *, tracked: bool) -> Iterator[_Message]:
+def _status(seconds: float, *, tracked: bool) -> Iterator[_Message]:
     yield "/VMC/Ext/OK", (_LOADED, _CALIBRATED, _NORMAL_MODE, int(tracked))
     yield "/VMC/Ext/T", (float(seconds),)
 
@@ -70,7 +71,7 @@ def _alive(seconds: float, *, tracked: bool) -> Iterator[_Message]:
 def _bones(moment: Moment) -> Iterator[_Message]:
     eye = unity_quaternion(_eye_rotation(moment.state.gaze))
     for bone, turn in (("Head", unity_quaternion(moment.rotation)), *((e, eye) for e in _EYES)):
-        yield "/VMC/Ext/Bone/Pos", (bone, *_PLACE, *turn)
+        yield "/VMC/Ext/Bone/Pos", (bone, *_POSITION, *turn)
 
 
 def _eye_rotation(gaze: Gaze) -> Array:
@@ -81,8 +82,8 @@ def _eye_rotation(gaze: Gaze) -> Array:
 
 def _blends(moment: Moment, given: Mapping[str, float]) -> Iterator[_Message]:
     # An avatar's clips go from 0 to 1; a region's weights are as they were found.
-    units = unit_weights(moment.state, given).items()
-    weights = {column_of(unit): min(max(weight, 0.0), 1.0) for unit, weight in units}
+    units = weights_with_gaze(moment.state, given).items()
+    weights = {column_name(unit): min(max(weight, 0.0), 1.0) for unit, weight in units}
     for name, weight in (weights | _region_weights(moment.state)).items():
         yield "/VMC/Ext/Blend/Val", (name, float(weight))
     yield "/VMC/Ext/Blend/Apply", ()

@@ -17,6 +17,7 @@ def check_export_place(path: str | Path, *, read: Iterable[str | Path] = ()) -> 
     """Refuse, before any work is done, a place that export_head could not or must not take.
 
     Args:
+        path: the file.
         read: files and folders that the head comes from.
 
     Raises:
@@ -48,6 +49,8 @@ def export_head(
     """Write the head as .glb, .obj (with .mtl and .png beside it) or .usdz.
 
     Args:
+        head: the head.
+        path: the file; its suffix tells the kind.
         parts: names of the mesh's parts; by default all but the hair cap and the lashes.
         units: with the face units as morph targets; an .obj cannot hold any.
         expression: which one an .obj shows; the other kinds hold all of them.

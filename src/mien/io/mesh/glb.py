@@ -26,7 +26,7 @@ class GlbBuffer:
         self._data = bytearray()
 
     def add_bytes(self, data: bytes, **fields: int) -> int:
-        """A buffer view of its own, four-byte aligned as every component type wants."""
+        """A buffer view of its own, four-byte aligned, which suits every component type."""
         self._data.extend(bytes(-len(self._data) % 4))
         view = {"buffer": 0, "byteOffset": len(self._data), "byteLength": len(data)}
         self._data.extend(data)
@@ -34,7 +34,7 @@ class GlbBuffer:
         return len(self.views) - 1
 
     def add_vectors(self, vectors: Float[Array, "n d"], *, bounds: bool = False) -> int:
-        """A vertex attribute; bounds are asked for positions."""
+        """A vertex attribute; positions need bounds."""
         single = np.ascontiguousarray(vectors, dtype="<f4")
         accessor = {
             "bufferView": self.add_bytes(single.tobytes(), target=_ARRAY_BUFFER),
@@ -45,7 +45,7 @@ class GlbBuffer:
         return self._add(accessor | (_bounds(single) if bounds else {}))
 
     def add_samples(self, samples: Float[Array, "*n_d"], *, bounds: bool = False) -> int:
-        """What an animation reads: numbers, vectors or quaternions; bounds are asked for times."""
+        """What an animation reads: numbers, vectors or quaternions; times need bounds."""
         single = np.ascontiguousarray(samples, dtype="<f4")
         accessor = {
             "bufferView": self.add_bytes(single.tobytes()),
@@ -68,7 +68,7 @@ class GlbBuffer:
         )
 
     def add_offsets(self, count: int, rows: Int[Array, " n"], offsets: Float[Array, "n 3"]) -> int:
-        """(count, 3) morph offsets that are zero but in the given rows, stored as short as they go.
+        """(count, 3) morph offsets that are zero but in the given rows, stored sparse if shorter.
 
         An accessor without data is all zeros (glTF 2.0, 3.6.2.3), and sparse values lie over it.
         """

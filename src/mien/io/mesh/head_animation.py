@@ -1,4 +1,4 @@
-"""A head that moves: weights of the morph targets and the head's place over time."""
+"""A head's animation: weights of its morph targets and its pose over time."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from mien.errors import InputError
 
 @dataclass(frozen=True)
 class HeadAnimation:
-    """What changes over time; straight on from each time to the next.
+    """What changes over time, linear between the times.
 
     Attributes:
-        times: (T,) seconds from 0 up, each later than the one before by what float32 can tell.
+        times: (T,) seconds from 0 up, ascending in float32, too.
         target_names: which morph targets move; the others rest at 0.
         weights: (T, N) their weights.
         rotations: (T, 3, 3) and
@@ -27,7 +27,7 @@ class HeadAnimation:
         name: what players list it as.
 
     Raises:
-        InputError: shapes that do not fit, NaN, no time, time that stands or runs backwards, a name
+        InputError: shapes that do not fit, NaN, no times, times that do not ascend, a name
             twice, a matrix that is no rotation.
     """
 

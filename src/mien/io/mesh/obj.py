@@ -14,7 +14,7 @@ from mien.arrays import Array, Float, Int
 from mien.head import NEUTRAL, Head
 from mien.io.files.atomic import atomic_file
 from mien.io.files.image import encode_image
-from mien.io.mesh.surface import ExportSurface, export_surface
+from mien.io.mesh.export_surface import ExportSurface, export_surface
 from mien.mesh import Mesh
 
 
@@ -32,6 +32,8 @@ def save_obj(
     blend shapes of them.
 
     Args:
+        head: the head.
+        path: the file.
         parts: names of parts; by default all but the hair cap and the lashes.
         expression: which of the photographed ones, with its texture.
 
@@ -39,7 +41,7 @@ def save_obj(
         InputError: an unknown part or expression, a place that cannot be written.
     """
     path = Path(path)
-    surface = export_surface(_at_rest_in(head, expression), parts=parts, units=False)
+    surface = export_surface(_with_neutral(head, expression), parts=parts, units=False)
     library, picture = (file.name for file in side_files(path))
     if surface.texture is None:
         picture = ""
@@ -62,7 +64,7 @@ def side_files(path: Path) -> tuple[Path, Path]:
     return path.with_name(f"{stem}.mtl"), path.with_name(f"{stem}.png")
 
 
-def _at_rest_in(head: Head, name: str) -> Head:
+def _with_neutral(head: Head, name: str) -> Head:
     """The head as if this expression were its neutral one, and its only one."""
     mesh, expression = head.expression_mesh(name), head.expressions[name]
     if expression.texture not in head.textures:

@@ -17,9 +17,9 @@ from mien.errors import InputError
 from mien.head import Head
 from mien.io.files.atomic import atomic_file
 from mien.io.files.image import encode_image
+from mien.io.mesh.export_surface import ExportSurface, MorphTarget, export_surface
 from mien.io.mesh.head_animation import HeadAnimation
-from mien.io.mesh.surface import ExportSurface, MorphTarget, export_surface
-from mien.io.mesh.usd_materials import define_materials, free_name, integers, texture_files
+from mien.io.mesh.usd_materials import define_materials, free_name, integers, texture_file_names
 
 # USD's own default unit, and what programs assume that do not read the file's.
 _METRES_PER_UNIT = 0.01
@@ -46,6 +46,8 @@ def save_usdz(
     their own make a variant set of the head, "texture": one is chosen, none are mixed.
 
     Args:
+        head: the head.
+        path: the file.
         parts: names of parts; by default all but the hair cap and the lashes.
         units: with the face units.
         animation: how the head moves.
@@ -63,7 +65,7 @@ def save_usdz(
     with TemporaryDirectory(prefix="mien-usd-") as folder:
         layer = Path(folder, "head.usdc")
         stage = Usd.Stage.CreateNew(str(layer))
-        files = texture_files(surface)
+        files = texture_file_names(surface)
         _fill_stage(stage, surface, head, files)
         if animation is not None:
             _animate(stage, animation, [target.name for target in surface.targets])
@@ -79,7 +81,7 @@ def save_usdz(
 def _package(members: dict[str, bytes]) -> bytes:
     """A .usdz: a zip archive whose members are stored as they are, from multiples of 64 bytes on.
 
-    USD's own writer puts in the time of day; the same head shall give the same bytes.
+    USD's own writer puts in the time of day; here the same head gives the same bytes.
     """
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
@@ -119,7 +121,7 @@ def _define_mesh(stage: Any, surface: ExportSurface) -> Any:
     prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
     prim.CreateFaceVertexCountsAttr(Vt.IntArray(len(mesh.triangles), 3))
     prim.CreateFaceVertexIndicesAttr(integers(mesh.triangles))
-    # A triangle mesh is meant as it is; the default would round it off.
+    # By default USD subdivides a mesh, which would round it off.
     prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     prim.CreateDoubleSidedAttr(True)
     prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(surface.normals.astype(np.float32)))
@@ -150,7 +152,7 @@ def _define_blend_shapes(stage: Any, mesh: Any, targets: tuple[MorphTarget, ...]
     )
     binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
     binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
-    # One influence for all vertices would do by the specification; some readers want one for each.
+    # By the specification one influence for all vertices is enough; some readers need one for each.
     count = len(mesh.GetPointsAttr().Get())
     binding.CreateJointIndicesPrimvar(False, 1).Set(Vt.IntArray(count))
     binding.CreateJointWeightsPrimvar(False, 1).Set(Vt.FloatArray(count, 1.0))

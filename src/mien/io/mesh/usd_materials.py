@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from mien.arrays import Array
-from mien.io.mesh.surface import ExportSurface, MaterialGroup
+from mien.io.mesh.export_surface import ExportSurface, MaterialGroup
 
 _SCOPE = "/head/materials"
 _VARIANTS = "texture"
 
 
-def texture_files(surface: ExportSurface) -> dict[str, str]:
+def texture_file_names(surface: ExportSurface) -> dict[str, str]:
     """The textures' names in the package."""
     files: dict[str, str] = {}
     for name in surface.textures:
@@ -40,7 +40,7 @@ def free_name(name: str, taken: Container[str]) -> str:
 
 
 def integers(indices: Array) -> Any:
-    """As USD wants them, one after the other."""
+    """A flat USD array of the indices."""
     from pxr import Vt
 
     return Vt.IntArray.FromNumpy(indices.astype(np.int32).ravel())

@@ -18,7 +18,7 @@ from tempfile import TemporaryFile
 
 import numpy as np
 
-from mien.animate.channels import head_angles
+from mien.animate.channels import head_angles_rad
 from mien.arrays import Array, Float, Int, check_array, check_rotation, frozen
 from mien.assets.generic import load_generic_head
 from mien.errors import EstimationError, InputError, escaped
@@ -131,18 +131,18 @@ class FapMeter:
             values[item.number] = max(0.0, value) if item.one_way else value
         for index, side in enumerate(EYEBALLS):
             at_rest, now = _eyeball(self.neutral, side), _eyeball(vertices, side)
-            yaw, pitch, _ = head_angles(_turn(at_rest, now), order="YXZ")
+            yaw, pitch, _ = head_angles_rad(_turn(at_rest, now), order="YXZ")
             values[[EYE_YAW[index], EYE_PITCH[index]]] = np.array([yaw, pitch]) / ANGLE_UNIT
             thrust = now.mean(axis=0)[2] - at_rest.mean(axis=0)[2]
             values[EYE_THRUST[index]] = 1024 * thrust / self.fapu.ES
         if rotation is not None:
-            yaw, pitch, roll = head_angles(check_rotation("rotation", rotation), order="YXZ")
+            yaw, pitch, roll = head_angles_rad(check_rotation("rotation", rotation), order="YXZ")
             head = [HEAD_YAW, HEAD_PITCH, HEAD_ROLL]
             values[head] = np.array([yaw, pitch, roll]) / ANGLE_UNIT
         return np.round(values[1:]).astype(np.int64)
 
 
-def write_fap(
+def save_fap(
     path: str | Path, values: Iterable[Int[Array, " 68"]], fps: float, *, name: str | None = None
 ) -> int:
     """Write parameters as a text .fap file, whole or not at all.
@@ -151,8 +151,9 @@ def write_fap(
     parameters follow, and one with the frame's number and their values.
 
     Args:
+        path: the file.
         values: (68,) a frame, as FapMeter.read gives them.
-        fps: frames a second; the format knows whole numbers only.
+        fps: frames a second; the format has whole numbers only.
         name: of the performance; the file's own unless given.
 
     Returns:
@@ -167,10 +168,10 @@ def write_fap(
     title = "_".join(escaped(name or Path(path).stem).split()) or "mien"
     mask = " ".join("1" if number in MEASURED else "0" for number in range(1, COUNT + 1))
     chosen, count = np.array(sorted(MEASURED)) - 1, 0
-    # The first line tells how many follow, which is known at the end.
+    # The first line holds the count, which is known at the end.
     with TemporaryFile("w+", encoding="utf-8", newline="\n") as body:
-        for count, values_now in enumerate(values, 1):
-            row = check_array(f"frame {count - 1}", values_now, (COUNT,), dtype=int)
+        for count, frame_values in enumerate(values, 1):
+            row = check_array(f"frame {count - 1}", frame_values, (COUNT,), dtype=int)
             body.write(f"{mask}\n{' '.join(map(str, [count - 1, *row[chosen].tolist()]))}\n")
         if not count:
             raise InputError(path, "at least one frame to write", "none")
@@ -198,8 +199,8 @@ def _weights(point: str) -> tuple[tuple[int, ...], Array]:
         return tuple(corners.tolist()), generic.landmark_barycentrics[int(index)]
     if kind == "tongue_tip":
         tongue = _part("tongue")
-        foremost = mesh.vertices[tongue, 2]
-        near = tongue[foremost > foremost.max() - 1.0]
+        depth = mesh.vertices[tongue, 2]
+        near = tongue[depth > depth.max() - 1.0]
         return tuple(near.tolist()), np.full(len(near), 1 / len(near))
     return (generic.vertex_of(point),), np.ones(1)
 

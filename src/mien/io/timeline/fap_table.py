@@ -1,9 +1,8 @@
 """The 68 facial animation parameters of MPEG-4, and where on the mesh each is measured.
 
 Source:
-    ISO/IEC 14496-2 annex C, table C-1; the feature points' places on our mesh are our choice,
-
-listed in docs/animation.md.
+    ISO/IEC 14496-2 annex C, table C-1; where the feature points lie on this mesh is a choice of
+    ours, listed in docs/reference/timeline.md.
 """
 
 from __future__ import annotations

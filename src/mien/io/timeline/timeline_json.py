@@ -1,4 +1,4 @@
-"""Timeline documents: a performance as JSON. docs/animation.md describes them."""
+"""Timeline documents: a performance as JSON. docs/reference/timeline.md describes them."""
 
 from __future__ import annotations
 
@@ -16,37 +16,37 @@ from mien.animate.channels import ANGLES, GAZE, HEAD, MEMBERS, REGIONS, UNITS, s
 from mien.animate.curves import Curve
 from mien.animate.layers import GENERATORS, Generator
 from mien.animate.timeline import PIVOT_MM, Clip, Layer, Placement, Timeline, Tracks
-from mien.errors import Broken, FileFormatError, InputError
+from mien.errors import DocumentError, InputError
 from mien.io.files.atomic import atomic_file
-from mien.io.timeline.timeline_curves import curve_from_json, curve_to_json, tidy
+from mien.io.timeline.timeline_curves import curve_from_json, curve_to_json, rounded
 from mien.limits import MAX_FPS, MAX_SECONDS, MAX_SIDE, MIN_FPS
 from mien.reading.strict_json import (
+    DocumentFormat,
     as_choice,
     as_list,
     as_number,
     as_object,
     as_text,
     as_whole,
-    check_format,
+    errors_name_file,
     join,
     need,
     read_json,
 )
 
-FORMAT = "mien timeline"
-VERSION = 1
+TIMELINE_FORMAT = DocumentFormat("mien timeline", 1)
 
 _MOTION = ("tracks", "play")
 _TOP = ("format", "version", "duration", "fps", "size", "pivot", *_MOTION, "clips", "layers")
 _PLACEMENT = ("clip", "at", "speed", "weight", "repeats")
-# Parameters of generators that are angles: degrees in the file.
 DEGREES = frozenset(("tip", "sway"))
+"""Parameters of generators that are angles: degrees in the file."""
 
 _LEAF_LIST = re.compile(r'\[\n[^\[\]{}"]*\]')
 _LEAF_OBJECT = re.compile(r"\{\n[^\[\]{}]*\}")
 
 
-def load_timeline(path: str | Path) -> Timeline:
+def load_timeline_json(path: str | Path) -> Timeline:
     """The performance in a timeline document.
 
     Raises:
@@ -56,13 +56,8 @@ def load_timeline(path: str | Path) -> Timeline:
             rise, a duration or rate out of range, a clip that contains itself, a newer version.
     """
     data = read_json(path)
-    try:
+    with errors_name_file(path):
         return timeline_from_json(data)
-    except Broken as broken:
-        raise FileFormatError(path, broken.problem, broken.place) from None
-    except InputError as error:
-        problem = f"expected {error.expected}, found {error.got}"
-        raise FileFormatError(path, problem, error.name) from None
 
 
 def save_timeline(path: str | Path, timeline: Timeline) -> None:
@@ -72,7 +67,7 @@ def save_timeline(path: str | Path, timeline: Timeline) -> None:
         InputError: a place that cannot be written.
     """
     text = json.dumps(timeline_to_json(timeline), indent=2, ensure_ascii=False, allow_nan=False)
-    # One key, one clip that is played, one pair of numbers: a line each.
+    # A key, a clip that is played, a pair of numbers are a line each.
     for inner in (_LEAF_LIST, _LEAF_OBJECT):
         text = inner.sub(lambda match: " ".join(match.group().split()), text)
     with atomic_file(path) as temporary:
@@ -80,8 +75,8 @@ def save_timeline(path: str | Path, timeline: Timeline) -> None:
 
 
 def timeline_from_json(data: Mapping[str, Any]) -> Timeline:
-    """The performance that a document's contents describe. Raises: Broken; InputError."""
-    check_format(data, FORMAT, VERSION)
+    """The performance that a document's contents describe. Raises: DocumentError; InputError."""
+    TIMELINE_FORMAT.check(data)
     top = as_object(data, "", _TOP)
     clips = as_object(top.get("clips", {}), "clips")
     return Timeline(
@@ -107,7 +102,7 @@ def _duration(data: dict[str, Any], place: str) -> float:
 def _size(value: object) -> tuple[int, int]:
     items = as_list(value, "size")
     if len(items) != 2:
-        raise Broken("size", f"expected [width, height], found {len(items)} entries")
+        raise DocumentError("size", f"expected [width, height], found {len(items)} entries")
     width, height = (
         as_whole(item, f"size[{i}]", above=0, most=MAX_SIDE) for i, item in enumerate(items)
     )
@@ -117,7 +112,7 @@ def _size(value: object) -> tuple[int, int]:
 def _numbers(value: object, place: str, count: int) -> list[float]:
     items = as_list(value, place)
     if len(items) != count:
-        raise Broken(place, f"expected {count} numbers, found {len(items)} entries")
+        raise DocumentError(place, f"expected {count} numbers, found {len(items)} entries")
     return [as_number(item, f"{place}[{i}]") for i, item in enumerate(items)]
 
 
@@ -190,20 +185,21 @@ def _generator(kind: str, given: dict[str, Any], place: str) -> Generator:
         return GENERATORS[kind](**values)
     except InputError as error:
         problem = f"expected {error.expected}, found {error.got}"
-        raise Broken(f"{place}.{error.name}", problem) from None
+        raise DocumentError(f"{place}.{error.name}", problem) from None
 
 
 def timeline_to_json(timeline: Timeline) -> dict[str, Any]:
     """The contents of the document that describes this timeline."""
-    data: dict[str, Any] = {"format": FORMAT, "version": VERSION}
-    data |= {"duration": tidy(timeline.duration), "fps": tidy(timeline.fps)}
+    data = TIMELINE_FORMAT.header
+    data |= {"duration": rounded(timeline.duration), "fps": rounded(timeline.fps)}
     if timeline.size is not None:
         data["size"] = list(timeline.size)
-    data["pivot"] = [tidy(value) for value in timeline.pivot]
+    data["pivot"] = [rounded(value) for value in timeline.pivot]
     data |= _motion_to_json(timeline.tracks, timeline.placements)
     if timeline.clips:
         data["clips"] = {
-            name: {"duration": tidy(clip.duration)} | _motion_to_json(clip.tracks, clip.placements)
+            name: {"duration": rounded(clip.duration)}
+            | _motion_to_json(clip.tracks, clip.placements)
             for name, clip in timeline.clips.items()
         }
     if timeline.layers:
@@ -222,7 +218,7 @@ def _motion_to_json(tracks: Tracks, placements: tuple[Placement, ...]) -> dict[s
         data["tracks"] = groups
     if placements:
         data["play"] = [
-            {key: value if key == "clip" else tidy(value) for key, value in asdict(item).items()}
+            {key: value if key == "clip" else rounded(value) for key, value in asdict(item).items()}
             for item in placements
         ]
     return data
@@ -235,5 +231,5 @@ def _layer_to_json(layer: Layer) -> dict[str, Any]:
         data["generator"] = kinds[type(layer.generator)]
         for name, value in asdict(layer.generator).items():
             factor = 180 / math.pi if name in DEGREES else 1
-            data[name] = value if name == "seed" else tidy(value * factor)
+            data[name] = value if name == "seed" else rounded(value * factor)
     return data | _motion_to_json(layer.tracks, layer.placements)

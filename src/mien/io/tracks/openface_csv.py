@@ -1,7 +1,7 @@
-"""A track as a CSV like OpenFace 2's, for programs that read pose, gaze and action units from it.
+"""A track as a CSV like OpenFace 2's, for programs that read pose, gaze and action units.
 
 A row a frame, counted from 1: pose in the camera's frame (mm, radians), a gaze vector for each eye,
-FACS action units from 0 to 5. What is approximate: docs/track-files.md.
+FACS action units from 0 to 5. What is approximate: docs/reference/track-files.md.
 
 Source:
     OpenFace's wiki, "Output Format"; the order of its FeatureExtraction's columns.
@@ -24,7 +24,7 @@ from mien.rig.state import FaceState, Gaze
 from mien.track.state import Track, TrackedFrame, TrackState
 
 FULL = 5.0
-"""Intensity of FACS' "E", the most that a face can do: that of a face unit of 1."""
+"""Intensity of FACS' "E", the maximum: that of a face unit of 1."""
 TRACE = 1.0
 """Intensity of FACS' "A": from there on an action unit counts as present."""
 
@@ -56,7 +56,7 @@ ACTION_UNITS: Mapping[str, tuple[str, ...]] = {
 """The face units whose mean stands for an action unit."""
 
 PRESENCE_ONLY = "AU28"
-"""OpenFace tells no intensity of it."""
+"""OpenFace has no intensity of it."""
 
 _INTENSITIES = tuple(name for name in ACTION_UNITS if name != PRESENCE_ONLY)
 COLUMNS = (
@@ -69,7 +69,7 @@ COLUMNS = (
 )
 
 
-def write_openface(
+def save_openface(
     path: str | Path,
     track: Track,
     *,
@@ -80,8 +80,10 @@ def write_openface(
     A lost frame has success 0, confidence 0 and zeros.
 
     Args:
-        units_of: the units that stand for a face; for a caller who can explain its photographed
-            expressions in units.
+        path: the file.
+        track: the track.
+        units_of: weights by unit for a face state; its own units unless given, which leave out
+            photographed expressions.
 
     Returns:
         how many frames were written.
@@ -126,9 +128,11 @@ def pose_angles(R_cam_head: Float[Array, "3 3"]) -> Float[Array, " 3"]:
 def gaze_vectors(
     R_cam_head: Float[Array, "3 3"], gaze: Gaze, units: Mapping[str, float]
 ) -> Float[Array, "2 3"]:
-    """Where the eyes look, unit vectors in the camera's axes: the subject's right eye, then left.
+    """Unit vectors of gaze, (2, 3) in the camera's axes: the subject's right eye, then left.
 
     Args:
+        R_cam_head: (3, 3).
+        gaze: of both eyes, in the head's axes.
         units: their EyeLook units add to the gaze.
     """
     directions = []
@@ -141,9 +145,10 @@ def gaze_vectors(
 
 
 def _header_cells(frame: TrackedFrame) -> list[str]:
-    there = frame.state is not None
-    sure = frame.seen if there and np.isfinite(frame.seen) else float(there)
-    return [str(frame.frame + 1), "0", f"{frame.time:.6f}", f"{sure:.6f}", str(int(there))]
+    found = frame.state is not None
+    confidence = frame.seen if found and np.isfinite(frame.seen) else float(found)
+    time = f"{frame.time:.6f}"
+    return [str(frame.frame + 1), "0", time, f"{confidence:.6f}", str(int(found))]
 
 
 def _face_cells(state: TrackState | None, units: Mapping[str, float]) -> list[str]:

@@ -1,6 +1,6 @@
 """Tracks as files: TRACK.csv, a row a frame, and beside it TRACK.json, which says what they mean.
 
-docs/track-files.md describes both.
+docs/reference/track-files.md describes both.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from mien.track.state import STATUSES, Layout, Track, TrackedFrame, TrackState
 
 FRAME = ("frame", "time", "status", "rms")
 POSE = ("rx", "ry", "rz", "tx", "ty", "tz")
-MATCH = ("seen", *(f"{term}.{colour}" for term in ("gain", "bias") for colour in "rgb"))
+APPEARANCE = ("seen", *(f"{term}.{colour}" for term in ("gain", "bias") for colour in "rgb"))
 DEVIATION = "sd."
 
 _DIGITS = 10  # after the point
@@ -36,11 +36,11 @@ _KIND = f"a track, whose first line starts with {','.join(FRAME)}"
 def columns_of(layout: Layout) -> tuple[str, ...]:
     """The names of all columns of TRACK.csv, in their order."""
     deviations = (f"{DEVIATION}{channel}" for channel in layout.channels)
-    return (*FRAME, *POSE, *layout.channels, *deviations, *MATCH)
+    return (*FRAME, *POSE, *layout.channels, *deviations, *APPEARANCE)
 
 
 def check_track_place(path: str | Path) -> None:
-    """Refuse, before any work is done, a name that write_track would not take.
+    """Refuse, before any work is done, a name that save_track would not take.
 
     Raises:
         InputError: another suffix than .csv; a TRACK.json beside it that is no track's, such as a
@@ -49,7 +49,7 @@ def check_track_place(path: str | Path) -> None:
     check_sidecar(sidecar_of(path))
 
 
-def write_track(path: str | Path, track: Track) -> None:
+def save_track(path: str | Path, track: Track) -> None:
     """Write TRACK.csv and TRACK.json, each whole or not at all; load_track gives the track back.
 
     Numbers keep 1e-10. A number that is not finite becomes an empty cell, and so do all of a lost
@@ -85,7 +85,7 @@ def load_track(path: str | Path) -> Track:
     Raises:
         InputError: a file that cannot be read, no TRACK.json.
         FileFormatError: names line and column, or the place in TRACK.json: another kind of file, a
-            newer version, columns that TRACK.json does not tell of, a value that is no finite
+            newer version, columns that do not follow from TRACK.json, a value that is no finite
             number, a status that is none, weights that do not sum to 1, frames that do not ascend.
     """
     path = Path(path)
@@ -106,7 +106,7 @@ def load_track(path: str | Path) -> Track:
 
 
 def _check_order(cells: _Cells, frames: Sequence[TrackedFrame]) -> None:
-    """Refuse the last frame where it does not follow, or leads too far."""
+    """Refuse the last frame where it is not after those before it, or too long after the first."""
     first, before, last = frames[0], frames[-2:][0], frames[-1]
     if len(frames) > 1 and last.frame <= before.frame:
         cells.refuse("frame", f"a number above {before.frame}", str(last.frame))
@@ -155,17 +155,17 @@ class _Cells:
 
 
 def _row(layout: Layout, frame: TrackedFrame) -> list[str]:
-    named = [str(frame.frame), _cell(frame.time), frame.status]
+    known = [str(frame.frame), _cell(frame.time), frame.status]
     if frame.state is None:
-        return named + [""] * (len(columns_of(layout)) - len(named))
+        return known + [""] * (len(columns_of(layout)) - len(known))
     state = frame.state
     pose = [*_vector_of(state.R_cam_head), *state.t_cam_head]
     channels = len(layout.channels)
     values = check_array("state.values", state.values, (channels,))
     deviations = check_array("deviations", frame.deviations, (channels,), finite=False)
-    match = [frame.seen, *frame.gain, *frame.bias]
-    numbers = [frame.rms, *pose, *values, *deviations, *match]
-    return named + [_cell(number) for number in numbers]
+    appearance = [frame.seen, *frame.gain, *frame.bias]
+    numbers = [frame.rms, *pose, *values, *deviations, *appearance]
+    return known + [_cell(number) for number in numbers]
 
 
 def _vector_of(rotation: Float[Array, "3 3"]) -> Float[Array, " 3"]:
@@ -197,17 +197,17 @@ def _frame(cells: _Cells, layout: Layout) -> TrackedFrame:
     if status == "lost":
         _check_empty(cells)
     deviations = [f"{DEVIATION}{channel}" for channel in layout.channels]
-    match = cells.numbers(MATCH, empty=True)
+    appearance = cells.numbers(APPEARANCE, empty=True)
     return TrackedFrame(
         frame=int(number),
         time=float(cells.numbers(("time",))[0]),
         status=status,
         state=_state(cells, layout) if status != "lost" else None,
         rms=float(cells.numbers(("rms",), empty=True)[0]),
-        seen=float(match[0]),
+        seen=float(appearance[0]),
         deviations=cells.numbers(deviations, empty=True),
-        gain=match[1:4],
-        bias=match[4:],
+        gain=appearance[1:4],
+        bias=appearance[4:],
     )
 
 
@@ -221,14 +221,14 @@ def _check_empty(cells: _Cells) -> None:
 def _state(cells: _Cells, layout: Layout) -> TrackState:
     pose = cells.numbers(POSE)
     values = cells.numbers(layout.channels)
-    known = len(layout.weight_channels)
+    count = len(layout.weight_channels)
     weights = np.ones((len(layout.regions), 1))
-    if known:
-        weights = values[:known].reshape(len(layout.regions), len(layout.expressions))
+    if count:
+        weights = values[:count].reshape(len(layout.regions), len(layout.expressions))
     for region, row in zip(layout.regions, weights, strict=True):
         if abs(row.sum() - 1) > _SUM_TOLERANCE:
             cells.refuse(region, "weights that sum to 1", f"{row.sum():g}")
-    units = values[known : known + len(layout.units)]
+    units = values[count : count + len(layout.units)]
     low, high = UNIT_RANGE
     for name, unit in zip(layout.units, units, strict=True):
         if not low <= unit <= high:
@@ -238,7 +238,7 @@ def _state(cells: _Cells, layout: Layout) -> TrackState:
         t_cam_head=pose[3:],
         weights=weights,
         units=units,
-        gaze=values[known + len(layout.units) :],
+        gaze=values[count + len(layout.units) :],
     )
 
 

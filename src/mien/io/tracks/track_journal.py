@@ -18,25 +18,25 @@ from typing import Any, BinaryIO, TextIO, cast
 import numpy as np
 
 from mien.arrays import Array, Float
-from mien.errors import Broken, FileFormatError, InputError
+from mien.errors import DocumentError, FileFormatError, InputError
 from mien.io.files.atomic import atomic_file
 from mien.limits import MAX_LINE, MAX_TABLE_BYTES
-from mien.reading.files import check_file
+from mien.reading.files import check_size
 from mien.reading.strict_json import (
+    DocumentFormat,
     as_choice,
     as_list,
     as_number,
     as_object,
     as_whole,
-    check_format,
+    errors_name_file,
     join,
     need,
     parse_json,
 )
 from mien.track.state import STATUSES, Layout, Status, TrackedFrame, TrackState
 
-FORMAT = "mien track journal"
-VERSION = 1
+JOURNAL_FORMAT = DocumentFormat("mien track journal", 1)
 FLUSH_SECONDS = 0.5
 """A killed run loses the frames of this time, and the one it was at."""
 
@@ -78,6 +78,7 @@ class Journal:
         """A new journal in the place of an older one.
 
         Args:
+            path: the file.
             header: what the frames follow from (video, head, options), as JSON has it; a run with
                 another one must not go on from here.
             frames: those of the journal that this one continues.
@@ -87,7 +88,7 @@ class Journal:
             InputError: a place that cannot be written.
         """
         path = Path(path)
-        top = {"format": FORMAT, "version": VERSION, "run": header}
+        top = JOURNAL_FORMAT.header | {"run": header}
         with atomic_file(path) as temporary, temporary.open("w", encoding="utf-8") as file:
             file.write(json.dumps(top) + "\n")
             file.writelines(_line_of(frame) for frame in frames)
@@ -134,6 +135,7 @@ def load_journal(
     """The frames that an unfinished run has kept; a last line that was cut off is left out.
 
     Args:
+        path: the file.
         header: of the run that wants to go on.
         layout: of its frames.
 
@@ -142,14 +144,16 @@ def load_journal(
         FileFormatError: no journal, a newer version; a line that holds no frame, or another one
             than that which follows.
     """
-    path = check_file(path, MAX_TABLE_BYTES)
+    path = check_size(path, MAX_TABLE_BYTES)
     frames: list[TrackedFrame] = []
     try:
         with path.open("rb") as file:
             lines = _whole_lines(file)
             _check_header(path, next(lines, b""), json.loads(json.dumps(header)))
             for number, line in enumerate(lines, 2):
-                frames.append(_frame(path, number, line, layout, frames))
+                data = _parsed(path, number, line, "a frame of a track")
+                with errors_name_file(path, line=number):
+                    frames.append(_frame(data, layout, frames))
     except OSError as error:
         raise InputError(path, "a readable file", error.strerror or error) from None
     return tuple(frames)
@@ -178,14 +182,10 @@ def _parsed(path: Path, number: int, line: bytes, expected: str) -> Json:
 
 
 def _check_header(path: Path, line: bytes, run: Json) -> None:
-    try:
-        top = _parsed(path, 1, line or b"null", "the journal of an unfinished track")
-        check_format(top, FORMAT, VERSION)
-    except Broken as broken:
-        raise FileFormatError(path, broken.problem, f"line 1, {broken.place}") from None
-    different = next(_differences(top.get("run"), run), None)
-    if different:
-        place, kept, wanted = different
+    top = _parsed(path, 1, line or b"null", "the journal of an unfinished track")
+    with errors_name_file(path, line=1):
+        JOURNAL_FORMAT.check(top)
+    for place, kept, wanted in _differences(top.get("run"), run):
         raise InputError(path, f"an unfinished run with {place} = {wanted}", f"one with {kept}")
 
 
@@ -228,45 +228,34 @@ def _numbers(array: Array) -> list[float]:
     return np.asarray(array, dtype=np.float64).ravel().tolist()
 
 
-def _frame(
-    path: Path, number: int, line: bytes, layout: Layout, before: Sequence[TrackedFrame]
-) -> TrackedFrame:
-    """The frame in a line, which follows those before it."""
-    data = _parsed(path, number, line, "a frame of a track")
-    try:
-        as_object(data, "", _FRAME)
-        index = as_whole(need(data, "frame", ""), "frame", least=0)
-        if index != len(before):
-            raise Broken("frame", f"expected {len(before)}, found {index}")
-        seconds = as_number(need(data, "time", ""), "time")
-        if before and seconds < before[-1].time:
-            raise Broken("time", f"expected {before[-1].time:g} s or later, found {seconds:g} s")
-        status = as_choice(need(data, "status", ""), "status", "status", STATUSES)
-        given = need(data, "state", "")
-        if (given is None) != (status == "lost"):
-            raise Broken(
-                "state", f"expected {'none' if given else 'one'} of a frame that is {status}"
-            )
-        channels, known = len(layout.channels), given is not None
-        match = [_floats(need(data, key, ""), key, 3, finite=known) for key in ("gain", "bias")]
-        rms, seen = _floats([need(data, "rms", ""), need(data, "seen", "")], "rms", 2, finite=known)
-        return TrackedFrame(
-            frame=index,
-            time=seconds,
-            status=cast(Status, status),
-            state=None if given is None else _state_from_json(as_object(given, "state"), layout),
-            rms=float(rms),
-            seen=float(seen),
-            deviations=_floats(need(data, "deviations", ""), "deviations", channels, finite=False),
-            gain=match[0],
-            bias=match[1],
-        )
-    except Broken as broken:
-        place = f"line {number}, {broken.place}"
-        raise FileFormatError(path, broken.problem, place) from None
-    except InputError as error:
-        problem = f"expected {error.expected}, found {error.got}"
-        raise FileFormatError(path, problem, f"line {number}, {error.name}") from None
+def _frame(data: Json, layout: Layout, before: Sequence[TrackedFrame]) -> TrackedFrame:
+    """The frame that follows those before it. Raises: DocumentError, InputError."""
+    as_object(data, "", _FRAME)
+    index = as_whole(need(data, "frame", ""), "frame", least=0)
+    if index != len(before):
+        raise DocumentError("frame", f"expected {len(before)}, found {index}")
+    seconds = as_number(need(data, "time", ""), "time")
+    if before and seconds < (earliest := before[-1].time):
+        raise DocumentError("time", f"expected {earliest:g} s or later, found {seconds:g} s")
+    status = as_choice(need(data, "status", ""), "status", "status", STATUSES)
+    state = need(data, "state", "")
+    if (state is None) != (status == "lost"):
+        expected = "none" if state else "one"
+        raise DocumentError("state", f"expected {expected} of a frame that is {status}")
+    found, channels = state is not None, len(layout.channels)
+    gain, bias = (_floats(need(data, key, ""), key, 3, finite=found) for key in ("gain", "bias"))
+    rms, seen = _floats([need(data, "rms", ""), need(data, "seen", "")], "rms", 2, finite=found)
+    return TrackedFrame(
+        frame=index,
+        time=seconds,
+        status=cast(Status, status),
+        state=_state_from_json(as_object(state, "state"), layout) if found else None,
+        rms=float(rms),
+        seen=float(seen),
+        deviations=_floats(need(data, "deviations", ""), "deviations", channels, finite=False),
+        gain=gain,
+        bias=bias,
+    )
 
 
 def _state_from_json(data: Json, layout: Layout) -> TrackState:
@@ -274,7 +263,7 @@ def _state_from_json(data: Json, layout: Layout) -> TrackState:
     shape = (len(layout.regions), len(layout.expressions))
     if need(data, "weights_shape", "state") != list(shape):
         found = str(data["weights_shape"])[:40]
-        raise Broken("state.weights_shape", f"expected {list(shape)}, found {found}")
+        raise DocumentError("state.weights_shape", f"expected {list(shape)}, found {found}")
     counts = {"R_cam_head": 9, "t_cam_head": 3, "weights": shape[0] * shape[1]}
     counts |= {"units": len(layout.units), "gaze": 2}
     arrays = {
@@ -289,10 +278,10 @@ def _state_from_json(data: Json, layout: Layout) -> TrackState:
 
 
 def _floats(value: object, place: str, count: int, *, finite: bool) -> Float[Array, " n"]:
-    """(count,) numbers; NaN among them unless they must be finite. Raises: Broken."""
+    """(count,) numbers; NaN among them unless they must be finite. Raises: DocumentError."""
     items = as_list(value, place)
     if len(items) != count:
-        raise Broken(place, f"expected {count} numbers, found {len(items)}")
+        raise DocumentError(place, f"expected {count} numbers, found {len(items)}")
     for index, item in enumerate(items):
         if finite or item == item:
             as_number(item, f"{place}[{index}]")

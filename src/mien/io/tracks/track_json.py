@@ -6,20 +6,20 @@ import json
 from importlib.metadata import version
 from pathlib import Path
 
-from mien.errors import Broken, FileFormatError, InputError
+from mien.errors import InputError
 from mien.limits import MAX_FPS, MAX_PHOTO_SIDE, MIN_FPS
 from mien.reading.strict_json import (
+    DocumentFormat,
     as_names,
     as_number,
     as_whole,
-    check_format,
+    errors_name_file,
     need,
     read_json,
 )
 from mien.track.state import Layout, Track
 
-FORMAT = "mien track"
-VERSION = 1
+TRACK_FORMAT = DocumentFormat("mien track", 1)
 
 
 def sidecar_of(path: str | Path) -> Path:
@@ -34,15 +34,9 @@ def check_sidecar(path: Path) -> None:
     """Refuse to write over a file that is no track's, such as a timeline of the same name.
 
     Raises:
-        InputError: bad input.
+        InputError: names the file.
     """
-    if not path.exists():
-        return
-    try:
-        described = read_json(path).get("format") == FORMAT
-    except (InputError, FileFormatError):
-        described = False
-    if not described:
+    if path.exists() and not TRACK_FORMAT.is_in(path):
         expected = "no file of this name, or that of an older track: it goes with the .csv"
         raise InputError(path, expected, "another file")
 
@@ -51,8 +45,7 @@ def sidecar_text(track: Track) -> str:
     """The contents of TRACK.json."""
     layout = track.layout
     data = {
-        "format": FORMAT,
-        "version": VERSION,
+        **TRACK_FORMAT.header,
         "generator": f"mien {version('mien')}",
         "width": track.width,
         "height": track.height,
@@ -77,8 +70,8 @@ def load_sidecar(path: Path) -> Track:
         expected = "the file that goes with the .csv and says what its numbers mean"
         raise InputError(path, expected, "no such file")
     data = read_json(path)
-    try:
-        check_format(data, FORMAT, VERSION)
+    with errors_name_file(path):
+        TRACK_FORMAT.check(data)
         width, height = (
             as_whole(need(data, key, ""), key, above=0, most=MAX_PHOTO_SIDE)
             for key in ("width", "height")
@@ -87,9 +80,4 @@ def load_sidecar(path: Path) -> Track:
         fps = as_number(need(data, "fps", ""), "fps", least=MIN_FPS, most=MAX_FPS)
         names = (as_names(need(data, key, ""), key) for key in ("regions", "expressions", "units"))
         layout = Layout(*names)
-    except Broken as broken:
-        raise FileFormatError(path, broken.problem, broken.place) from None
-    except InputError as error:
-        problem = f"expected {error.expected}, found {error.got}"
-        raise FileFormatError(path, problem, error.name) from None
     return Track(layout, width, height, focal_px, fps, ())

@@ -46,7 +46,7 @@ def normalize_contrast(
     return centered / (np.sqrt(variance) + _NOISE_FLOOR)
 
 
-def match_images(
+def optical_flow(
     a: Float[Array, "h w"], b: Float[Array, "h w"], *, fine: bool = False
 ) -> Float[Array, "h w 2"]:
     """(H, W, 2) px: where each pixel of a is found in b, less its own place.
@@ -86,7 +86,7 @@ def _searcher(fine: bool) -> Any:
     """Not kept: it is not safe in two threads at once.
 
     On rendered pairs with exact truth these settings are as near to it as the preset's, in less
-    than half the time (docs/registration.md).
+    than half the time (docs/method/registration.md).
     """
     import cv2
 

@@ -35,7 +35,7 @@ def sample_bilinear(image: Array, xy: Float[Array, "n 2"]) -> Float[Array, "n c"
 
 
 @njit(cache=True, nogil=True)
-def bilinear_place(
+def bilinear_neighbours(
     x: float, y: float, width: int, height: int
 ) -> tuple[int, int, int, int, float, float]:
     """The four pixels around a place and how far it is between them: (x0, x1, y0, y1, fx, fy)."""
@@ -49,7 +49,7 @@ def bilinear_place(
 def _sample_rows(image: Array, xy: Array, first: int, end: int, out: Array) -> None:
     height, width, channels = image.shape
     for n in range(first, end):
-        x0, x1, y0, y1, fx, fy = bilinear_place(xy[n, 0], xy[n, 1], width, height)
+        x0, x1, y0, y1, fx, fy = bilinear_neighbours(xy[n, 0], xy[n, 1], width, height)
         for c in range(channels):
             above = (1.0 - fx) * image[y0, x0, c] + fx * image[y0, x1, c]
             below = (1.0 - fx) * image[y1, x0, c] + fx * image[y1, x1, c]

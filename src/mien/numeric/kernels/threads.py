@@ -49,7 +49,7 @@ def for_row_bands(kernel: Callable[[int, int], object], rows: int, *, work: int)
         task.result()
 
 
-def side_by_side(*tasks: Callable[[], _Result]) -> list[_Result]:
+def run_concurrently(*tasks: Callable[[], _Result]) -> list[_Result]:
     """What each task returns; they run at once, in as many threads as Numba uses.
 
     Args:

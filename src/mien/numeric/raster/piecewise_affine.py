@@ -9,7 +9,14 @@ from mien.errors import InputError
 from mien.numeric.kernels.jit import njit
 from mien.numeric.raster.rasterizer import check_triangles
 
-__all__ = ["SUBPIXELS", "affine_maps", "cut_row", "extents", "facing", "snapped"]
+__all__ = [
+    "SUBPIXELS",
+    "affine_maps",
+    "orient_triangles",
+    "row_extents",
+    "scanline_spans",
+    "to_subpixels",
+]
 
 SUBPIXELS = 1024
 """Corners are drawn at whole parts of a pixel: sums are exact, and no pixel is lost or shared."""
@@ -18,14 +25,16 @@ _FARTHEST = 1 << 18
 """px. Corners farther off are drawn there, so that products of differences fit 64 bits."""
 
 
-def snapped(points: Float[Array, "n 2"]) -> Int[Array, "n 2"]:
+def to_subpixels(points: Float[Array, "n 2"]) -> Int[Array, "n 2"]:
     """(n, 2) int64, in parts of a pixel, of (n, 2) px. Raises: InputError: shape, NaN."""
     points = check_array("points", points, (None, 2))
     near = np.clip(points, -_FARTHEST, _FARTHEST)
     return frozen(np.round(near * SUBPIXELS).astype(np.int64))
 
 
-def facing(triangles: Int[Array, "t 3"], points: Float[Array, "n 2"]) -> Int[Array, "t 3"]:
+def orient_triangles(
+    triangles: Int[Array, "t 3"], points: Float[Array, "n 2"]
+) -> Int[Array, "t 3"]:
     """The triangles, all turned the way around that is drawn where points lie as given.
 
     Points may be moved then: what folds over is not drawn. While the mesh's border stays, its
@@ -50,8 +59,8 @@ def affine_maps(corners: Array, triangles: Array, pictures: Array) -> Array:
     """Where in other pictures the pixels of each triangle lie.
 
     Args:
-        corners: (n, 2) snapped, of the picture that is drawn.
-        triangles: (T, 3) facing.
+        corners: (n, 2) in parts of a pixel, of the picture that is drawn.
+        triangles: (T, 3) oriented by `orient_triangles`.
         pictures: (m, n, 2) px, the same points in each of the others.
 
     Returns:
@@ -84,7 +93,7 @@ def affine_maps(corners: Array, triangles: Array, pictures: Array) -> Array:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def extents(corners: Array, triangles: Array) -> tuple[Array, Array]:
+def row_extents(corners: Array, triangles: Array) -> tuple[Array, Array]:
     """First row and end of each triangle (T,), in the picture or not; none where folded over."""
     tops, ends = np.zeros(len(triangles), np.int64), np.zeros(len(triangles), np.int64)
     for t in range(len(triangles)):
@@ -97,7 +106,7 @@ def extents(corners: Array, triangles: Array) -> tuple[Array, Array]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def cut_row(
+def scanline_spans(
     corners: Array,
     triangles: Array,
     tops: Array,
@@ -113,8 +122,8 @@ def cut_row(
     Where several cover a pixel, as beside a fold, the one that begins first has it.
 
     Args:
-        tops: of `extents`.
-        ends: of `extents`.
+        tops: of `row_extents`.
+        ends: of `row_extents`.
         width: of the picture.
         found: (T, 3) memory to work in.
         starts: (2 T + 2,) filled with the spans' first columns and, after them, the width.

@@ -66,7 +66,7 @@ def rasterize(
     vertices_px = check_array("vertices_px", vertices_px, (None, 2), finite=False)
     depth = check_array("depth", depth, (len(vertices_px),), finite=False)
     triangles = check_triangles(triangles, len(vertices_px))
-    raster = unfilled(width, height)
+    raster = empty_raster(width, height)
     inputs = [frozen(np.ascontiguousarray(array)) for array in (vertices_px, depth, triangles)]
     outputs = (raster.triangle_ids, raster.barycentrics, raster.depth)
 
@@ -77,7 +77,7 @@ def rasterize(
     return raster
 
 
-def unfilled(width: int, height: int) -> Raster:
+def empty_raster(width: int, height: int) -> Raster:
     """Memory that rasterize_rows is the first to touch: that takes long, but it runs in threads."""
     shape = (height, width)
     ids, depth = np.empty(shape, np.int32), np.empty(shape, np.float32)

@@ -6,10 +6,10 @@ import numpy as np
 
 from mien.arrays import Array, Float
 
-__all__ = ["Anderson"]
+__all__ = ["AndersonAcceleration"]
 
 
-class Anderson:
+class AndersonAcceleration:
     """Proposes the next iterate from the last few pairs (x, g(x)).
 
     It chooses the combination of past iterates whose combined step g(x) - x is shortest and takes

@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-__all__ = ["LmResult", "minimize_lm"]
+__all__ = ["LevenbergMarquardtResult", "minimize_lm"]
 
 X = TypeVar("X")
 S = TypeVar("S")
@@ -16,7 +16,7 @@ _MIN_DAMPING, _MAX_DAMPING = 1e-12, 1e12
 
 
 @dataclass(frozen=True)
-class LmResult(Generic[X]):
+class LevenbergMarquardtResult(Generic[X]):
     """Where the iteration ended.
 
     Attributes:
@@ -42,7 +42,7 @@ def minimize_lm(
     max_iterations: int = 100,
     tolerance: float = 1e-10,
     max_failures: int | None = None,
-) -> LmResult[X]:
+) -> LevenbergMarquardtResult[X]:
     """Goes downhill from x.
 
     Args:
@@ -63,7 +63,7 @@ def minimize_lm(
         while True:
             step, predicted = solve(damping)
             if not predicted > tolerance * value:
-                return LmResult(x, value, iteration, True)
+                return LevenbergMarquardtResult(x, value, iteration, True)
             moved = move(x, step)
             moved_value = cost(moved)
             gain = (value - moved_value) / predicted
@@ -71,7 +71,7 @@ def minimize_lm(
                 break
             damping, growth, failures = damping * growth, 2 * growth, failures + 1
             if damping > _MAX_DAMPING or failures == max_failures:
-                return LmResult(x, value, iteration, True)
+                return LevenbergMarquardtResult(x, value, iteration, True)
         damping = max(damping * max(1 / 3, 1 - (2 * gain - 1) ** 3), _MIN_DAMPING)
         growth, x, value = 2.0, moved, moved_value
-    return LmResult(x, value, max_iterations, False)
+    return LevenbergMarquardtResult(x, value, max_iterations, False)

@@ -9,7 +9,7 @@ import numpy as np
 from mien.arrays import Array, Float, check_array, frozen
 from mien.errors import EstimationError, InputError
 
-__all__ = ["nearest_mixture", "simplex_least_squares"]
+__all__ = ["simplex_least_squares", "simplex_quadratic_program"]
 
 _ACCURACIES = (1e-12, 1e-8, 1e-6)
 """Of a cost whose greatest coefficient is 2: the best that rounding lets the solver reach."""
@@ -53,10 +53,10 @@ def simplex_least_squares(
     # Shares sum to 1: the target taken from each column leaves the cost as it is, with smaller
     # numbers than eq. (5)'s and none linear.
     apart = columns - target[:, None]
-    return nearest_mixture(apart.T @ apart, slack=slack, penalty=costs)
+    return simplex_quadratic_program(apart.T @ apart, slack=slack, penalty=costs)
 
 
-def nearest_mixture(
+def simplex_quadratic_program(
     products: Float[Array, "m m"], *, slack: float = 0.0, penalty: Float[Array, " m"]
 ) -> Float[Array, " m"]:
     """The same from the columns' products with each other, when the target is taken from each.

@@ -14,17 +14,17 @@ from mien.errors import InputError
 from mien.head import Head
 from mien.io.files.atomic import check_file_place, check_files_apart
 from mien.io.files.video import check_video_place
-from mien.io.live.live_link import write_live_link
-from mien.io.tracks.openface_csv import write_openface
-from mien.io.tracks.track_csv import check_track_place, write_track
+from mien.io.live.live_link_csv import save_live_link
+from mien.io.tracks.openface_csv import save_openface
+from mien.io.tracks.track_csv import check_track_place, save_track
 from mien.io.tracks.track_journal import journal_of
 from mien.io.tracks.track_json import sidecar_of
 from mien.pipelines.explained import units_of
-from mien.reading.names import plain_name
+from mien.progress import Progress
+from mien.reading.names import portable_name
 from mien.track.state import Track
 
 if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
     from mien.render.picture import HeadRenderer
 
 OVERLAY, PLOTS = "Drawing the overlay", "Drawing plots"
@@ -32,7 +32,7 @@ OVERLAY, PLOTS = "Drawing the overlay", "Drawing plots"
 
 @dataclass(frozen=True)
 class TrackFiles:
-    """Where the results go; None: not wanted.
+    """Which files a track is written to; None: not written.
 
     Attributes:
         table: TRACK.csv, with TRACK.json beside it.
@@ -82,12 +82,12 @@ class TrackFiles:
         Yields:
             what the user should know.
         """
-        write_track(self.table, track)
+        save_track(self.table, track)
         explained = partial(units_of, head)
         if self.openface:
-            write_openface(self.openface, track, units_of=explained)
+            save_openface(self.openface, track, units_of=explained)
         if self.live_link and any(frame.state for frame in track.frames):
-            write_live_link(self.live_link, track_moments(track), units_of=explained)
+            save_live_link(self.live_link, track_moments(track), units_of=explained)
         elif self.live_link:
             yield f"{self.live_link}: not written: no frame shows the face"
         if self.overlay or self.plots:
@@ -106,7 +106,7 @@ class TrackFiles:
             write_track_plots(
                 self.plots,
                 track,
-                title=plain_name(video.path),
+                title=portable_name(video.path),
                 video=video,
                 head=renderer,
                 progress=partial(tell, PLOTS),

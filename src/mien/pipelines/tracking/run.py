@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -19,11 +19,9 @@ from mien.head import Head
 from mien.io.tracks.track_journal import Journal, journal_of, load_journal
 from mien.limits import MAX_FPS
 from mien.pipelines.tracking.ready_head import ReadyHead
-from mien.reading.names import plain_name
+from mien.progress import Progress
+from mien.reading.names import portable_name
 from mien.track.state import Layout, Track, TrackedFrame
-
-if TYPE_CHECKING:
-    from mien.pipelines.build import Progress
 
 TRACKING = "Tracking"
 _AGREE = 1e-3
@@ -81,7 +79,7 @@ class TrackRun:
         path = self.clip.path
         return {
             "generator": f"mien {version('mien')}",
-            "video": {"name": plain_name(path), "bytes": path.stat().st_size},
+            "video": {"name": portable_name(path), "bytes": path.stat().st_size},
             "head": digest(self.ready.head),
             "focal_px": self.focal_px,
             "max_side": self.max_side,

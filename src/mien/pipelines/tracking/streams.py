@@ -14,11 +14,11 @@ import numpy as np
 from mien.animate.timeline import Moment
 from mien.errors import InputError
 from mien.io.live import live_link_udp, vmc
-from mien.io.live.live_link import values_of
+from mien.io.live.live_link import live_link_values
 from mien.rig.state import FaceState
 
 HOST, SUBJECT = "127.0.0.1", "mien"
-PORTS = {"livelink": live_link_udp.PORT, "vmc": vmc.PORT}
+PORTS = {"livelink": live_link_udp.LIVE_LINK_PORT, "vmc": vmc.VMC_PORT}
 
 _AT_REST = Moment(0.0, FaceState(), np.eye(3), np.zeros(3))
 
@@ -93,7 +93,7 @@ class LiveLinkEncoder:
     begin: float
 
     def found(self, moment: Moment, given: Mapping[str, float]) -> bytes:
-        seconds, values = self.begin + moment.time, values_of(moment, given)
+        seconds, values = self.begin + moment.time, live_link_values(moment, given)
         return live_link_udp.encode(live_link_udp.Packet(self.subject, seconds, values))
 
     def lost(self, seconds: float) -> None:

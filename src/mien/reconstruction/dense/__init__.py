@@ -1,5 +1,5 @@
 """Dense registration: the photos aligned with each other through the head's surface.
 
 Landmarks slide over the face with the view; skin does not. Every patch of skin that two photos
-show tells the cameras and the shape (docs/registration.md).
+show tells the cameras and the shape (docs/method/registration.md).
 """

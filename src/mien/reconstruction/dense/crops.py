@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.mesh import Mesh
 from mien.numeric.raster.rasterizer import Raster, rasterize
 
@@ -53,7 +53,7 @@ def finest_mm_per_px(cameras: Sequence[Camera]) -> float:
     return min(float(camera.t_cam_head[2]) / camera.focal_px for camera in cameras)
 
 
-def crop_view(view: View, camera: Camera, mesh: Mesh, mm_per_px: float) -> Crop | None:
+def crop_view(view: CapturedView, camera: Camera, mesh: Mesh, mm_per_px: float) -> Crop | None:
     """The part of a photo that shows the mesh, reduced so that a pixel shows mm_per_px.
 
     None where the camera sees next to nothing of the mesh.

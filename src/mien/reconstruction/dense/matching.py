@@ -8,8 +8,8 @@ import numpy as np
 
 from mien.arrays import Array, Bool, Float, Shaped
 from mien.mesh import Mesh
-from mien.numeric.images.optical_flow import local_correlation, match_images, normalize_contrast
-from mien.numeric.kernels.threads import side_by_side
+from mien.numeric.images.optical_flow import local_correlation, normalize_contrast, optical_flow
+from mien.numeric.kernels.threads import run_concurrently
 from mien.numeric.raster.rasterizer import interpolate
 from mien.reconstruction.dense.crops import Crop
 
@@ -91,7 +91,7 @@ def match_sights(a: Sight, b: Sight, *, fine: bool = False) -> Match | None:
     radius = KEPT_DETAIL_MM / 2 * a.crop.camera.focal_px / float(a.crop.camera.t_cam_head[2])
     ours = normalize_contrast(a.crop.grey[window], mask, radius)
     theirs = normalize_contrast(_sample(b.crop.grey, there, cv2.INTER_CUBIC), mask, radius)
-    moved = match_images(ours, theirs, fine=fine) + _centres(mask)
+    moved = optical_flow(ours, theirs, fine=fine) + _centres(mask)
     alike = local_correlation(ours, _sample(theirs, moved)) > LEAST_CORRELATION
     within = _sample(mask.astype(np.float32), moved) > _ALL
     inside = cv2.erode(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
@@ -104,9 +104,9 @@ def match_both(a: Sight, b: Sight, *, fine: bool = False) -> tuple[Checked, Chec
     """a's pixels in b and b's in a, checked by each other; None where they share nothing.
 
     Args:
-        fine: as in match_images.
+        fine: as in optical_flow.
     """
-    there, back = side_by_side(
+    there, back = run_concurrently(
         lambda: match_sights(a, b, fine=fine), lambda: match_sights(b, a, fine=fine)
     )
     if there is None or back is None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.mesh import Mesh
 from mien.reconstruction.dense.crops import Crop, crop_view
 from mien.reconstruction.dense.matching import Checked, Sight, match_both
@@ -68,7 +68,7 @@ class Tracks:
 
 
 def find_tracks(
-    views: Sequence[View],
+    views: Sequence[CapturedView],
     cameras: Sequence[Camera],
     mesh: Mesh,
     *,
@@ -87,7 +87,7 @@ def find_tracks(
         mesh: what the photos show (crops.visible_mesh).
         mm_per_px: scale at which to match.
         places: about how many to follow, over all photos.
-        fine: as in match_images.
+        fine: as in optical_flow.
     """
     share = places / max(1, len(views))
     normals = mesh.vertex_normals()

@@ -9,7 +9,7 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.faces.landmarks import inside_picture
 from mien.capture.faces.mediapipe_face import LEFT_IRIS, RIGHT_IRIS
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 
 EYEBALLS = {"left_eyeball": LEFT_IRIS, "right_eyeball": RIGHT_IRIS}
 MOST_RAD = np.deg2rad(45.0)
@@ -17,7 +17,7 @@ MOST_RAD = np.deg2rad(45.0)
 
 
 def iris_directions(
-    view: View, camera: Camera, vertices: Float[Array, "v 3"], generic: GenericHead
+    view: CapturedView, camera: Camera, vertices: Float[Array, "v 3"], generic: GenericHead
 ) -> Float[Array, "2 3"] | None:
     """(2, 3) unit vectors from the centres of the left and the right eyeball to their irises.
 

@@ -9,14 +9,14 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, Int
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.mesh import Mesh
 from mien.numeric.raster.rasterizer import interpolate
 from mien.numeric.rotation import angle_between
 from mien.reconstruction.dense.crops import crop_view, finest_mm_per_px, visible_mesh
 from mien.reconstruction.dense.matching import Sight, match_both
 from mien.reconstruction.expression.known_head import KnownHead
-from mien.reconstruction.observations import Sightings
+from mien.reconstruction.observations import SurfaceObservations
 
 MATCHED_SIGMA_MM = 0.4
 """Error of skin found again: wrinkles and light change what it looks like."""
@@ -26,14 +26,14 @@ _PATCH_PX, _LEAST_STEP_PX = 8, 2
 
 
 def follow_skin(
-    view: View,
+    view: CapturedView,
     camera: Camera,
     vertices: Float[Array, "v 3"],
     known: KnownHead,
     *,
     photo: int,
     mm_per_px: float,
-) -> Sightings | None:
+) -> SurfaceObservations | None:
     """Places of the neutral head's skin where the expression's photo shows them.
 
     The neutral photo that looks from the nearest side is drawn as the expression's camera would
@@ -66,10 +66,10 @@ def follow_skin(
     corners = still.triangles[raster.triangle_ids[rows, columns]]
     steady = _steady(known.generic)[corners].all(axis=1)
     rows, columns, corners = rows[steady], columns[steady], corners[steady]
-    return Sightings(
+    return SurfaceObservations(
         corners=corners,
         barycentrics=raster.barycentrics[rows, columns].astype(np.float64),
-        beside=np.zeros((len(rows), 3)),
+        offset=np.zeros((len(rows), 3)),
         photo=np.full(len(rows), photo),
         image_points=here.crop.to_photo(match.places[rows, columns]),
         # Places that share a patch of the matching share its error.
@@ -93,7 +93,9 @@ def _nearest(camera: Camera, known: KnownHead) -> int:
     return int(np.argmin(turned))
 
 
-def _sight(view: View, camera: Camera, mesh: Mesh, other: Mesh, scale: float) -> Sight | None:
+def _sight(
+    view: CapturedView, camera: Camera, mesh: Mesh, other: Mesh, scale: float
+) -> Sight | None:
     """The photo's view of a mesh, its points where the other mesh has them."""
     crop = crop_view(view, camera, mesh, scale)
     if crop is None:

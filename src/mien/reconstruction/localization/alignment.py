@@ -8,7 +8,7 @@ import numpy as np
 
 from mien.arrays import Array, Bool, Float, UInt8
 from mien.camera import Camera
-from mien.numeric.images.optical_flow import local_correlation, match_images, normalize_contrast
+from mien.numeric.images.optical_flow import local_correlation, normalize_contrast, optical_flow
 from mien.reconstruction.localization.camera_refinement import FocalBelief, refine_camera
 from mien.reconstruction.localization.gallery import (
     Gallery,
@@ -83,7 +83,7 @@ def align(
     radius = _DETAIL_MM * px_per_mm(small)
     ours = normalize_contrast(painting.grey.astype(np.float32), known, radius)
     theirs = normalize_contrast(grey.astype(np.float32), near, radius)
-    shifts = match_images(ours, theirs)
+    shifts = optical_flow(ours, theirs)
     rows, columns = np.mgrid[: grey.shape[0], : grey.shape[1]].astype(np.float32)
     found = cv2.remap(
         theirs, columns + shifts[..., 0], rows + shifts[..., 1], cv2.INTER_LINEAR, borderValue=0.0

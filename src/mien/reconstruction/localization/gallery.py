@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, UInt8
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.mesh import Mesh
 from mien.numeric.images.sampling import sample_bilinear
 from mien.numeric.raster.rasterizer import Raster, interpolate, rasterize
@@ -69,7 +69,7 @@ class Gallery:
 
     def __init__(
         self,
-        photos: Sequence[tuple[View, Camera]],
+        photos: Sequence[tuple[CapturedView, Camera]],
         vertices: Float[Array, "v 3"],
         generic: GenericHead,
     ) -> None:
@@ -145,7 +145,7 @@ def _rasterized(mesh: Mesh, camera: Camera) -> Raster:
     return rasterize(pixels, depth, mesh.triangles, camera.width, camera.height)
 
 
-def _prepared(view: View, camera: Camera, mesh: Mesh) -> _Known:
+def _prepared(view: CapturedView, camera: Camera, mesh: Mesh) -> _Known:
     import cv2
 
     grey = reduced(view.photo.pixels, PX_PER_MM / px_per_mm(camera))

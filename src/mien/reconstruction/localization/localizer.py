@@ -11,7 +11,7 @@ from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.images.photos import Photo
-from mien.capture.source import View
+from mien.capture.source import CapturedView
 from mien.reconstruction.localization.alignment import Alignment, align, improve
 from mien.reconstruction.localization.camera_refinement import FocalBelief
 from mien.reconstruction.localization.candidates import find_looks, find_starts
@@ -33,13 +33,13 @@ _PROMISING, _PROMISING_MM = 0.5, 4.0
 LEAST_AGREEMENT, AGREEMENT_MM = 0.45, 1.5
 """Share of the head that looks alike within so many mm. Measured: 0.5 to 0.95 where a camera is
 right, up to 0.21 for mirrored photos, for another head in the same skin, for wrong cameras
-(docs/registration.md)."""
+(docs/method/registration.md)."""
 _LEAST_AREA_MM2 = 1000.0
 
 
 def place_view(
-    view: View,
-    others: Sequence[tuple[View, Camera]],
+    view: CapturedView,
+    others: Sequence[tuple[CapturedView, Camera]],
     vertices: Float[Array, "v 3"],
     generic: GenericHead,
 ) -> Camera | None:
@@ -60,8 +60,8 @@ def place_view(
 
 
 def place_views(
-    views: Sequence[View],
-    others: Sequence[tuple[View, Camera]],
+    views: Sequence[CapturedView],
+    others: Sequence[tuple[CapturedView, Camera]],
     vertices: Float[Array, "v 3"],
     generic: GenericHead,
 ) -> tuple[Camera | None, ...]:
@@ -89,7 +89,7 @@ class _Placer:
 
     def __init__(
         self,
-        others: Sequence[tuple[View, Camera]],
+        others: Sequence[tuple[CapturedView, Camera]],
         vertices: Float[Array, "v 3"],
         generic: GenericHead,
     ) -> None:
@@ -100,7 +100,7 @@ class _Placer:
         self.relative_focal = float(np.median([c.focal_px for c in cameras] / sides))
         self.relative_scale = float(np.median([px_per_mm(c) for c in cameras] / sides))
 
-    def place(self, view: View) -> Camera | None:
+    def place(self, view: CapturedView) -> Camera | None:
         """The camera of the first start that ends well."""
         photo = view.photo
         focal = self._focal_belief(photo)

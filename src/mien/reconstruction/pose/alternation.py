@@ -8,7 +8,7 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.numeric.rotation import rotation_from_vector, rotation_to_vector
-from mien.numeric.solvers.anderson import Anderson
+from mien.numeric.solvers.anderson import AndersonAcceleration
 from mien.numeric.solvers.robust import Loss
 from mien.reconstruction.pose.linear_steps import (
     Poses,
@@ -76,7 +76,7 @@ def alternate(
         tolerance: relative decrease of the cost over five sweeps at which they have settled.
     """
     anchor, frame = points, _Frame(poses, points)
-    accelerate = Anderson(history) if history else None
+    accelerate = AndersonAcceleration(history) if history else None
     costs: list[float] = []
     plain = poses
     for sweep in range(max_sweeps):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import closing
 from itertools import repeat
 from pathlib import Path
@@ -14,7 +14,8 @@ from mien.capture.video.frames_ahead import AHEAD, read_ahead
 from mien.capture.video.video import Frame, Video
 from mien.errors import InputError
 from mien.head import Head
-from mien.io.files.video import write_video
+from mien.io.files.video import save_video
+from mien.progress import StepProgress, no_step_progress
 from mien.render.picture import GREY, HeadRenderer
 from mien.render.shade import over_background
 from mien.report.track.caption import caption, say_lost
@@ -38,7 +39,7 @@ def write_overlay(
     track: Track,
     head: Head | HeadRenderer,
     *,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: StepProgress = no_step_progress,
 ) -> int:
     """Write a video of what was tracked, whole or not at all.
 
@@ -68,7 +69,7 @@ def write_overlay(
             progress(done, len(counts))
 
     with read_ahead(decoded(video, track), AHEAD) as frames:
-        return write_video(path, shown(frames), fps)
+        return save_video(path, shown(frames), fps)
 
 
 def overlay_frames(

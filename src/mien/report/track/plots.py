@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from mien.errors import InputError
 from mien.head import Head
 from mien.io.files.atomic import atomic_file, check_file_place
 from mien.io.files.image import save_image
+from mien.progress import StepProgress, no_step_progress
 from mien.render.picture import HeadRenderer
 from mien.report.track.charts import Plot, plots_of
 from mien.report.track.figures import save_figure
@@ -42,7 +43,7 @@ def write_track_plots(
     video: str | Path | Video | None = None,
     head: Head | HeadRenderer | None = None,
     kind: str = "png",
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: StepProgress = no_step_progress,
 ) -> tuple[Path, ...]:
     """Write plots like [Pighin 2002]'s figs. 10 to 19 and a page of them, each whole or not at all.
 

@@ -9,7 +9,7 @@ import numpy as np
 from mien.animate.from_track import FACING
 from mien.arrays import Array, Bool, Float, Int
 from mien.numeric.rotation import angle_between
-from mien.report.page import head_angles
+from mien.report.page import head_angles_deg
 from mien.track.state import Track
 
 
@@ -19,6 +19,7 @@ class Series:
 
     Attributes:
         numbers: (N,) of the frames.
+        times: (N,) seconds.
         status: (N,).
         rms: (N,) as TrackedFrame's.
         seen: (N,) as TrackedFrame's.
@@ -30,6 +31,7 @@ class Series:
     """
 
     numbers: Int[Array, " n"]
+    times: Float[Array, " n"]
     status: tuple[str, ...]
     rms: Float[Array, " n"]
     seen: Float[Array, " n"]
@@ -54,11 +56,12 @@ def series_of(track: Track) -> Series:
     for row, found in enumerate(frames):
         if found.state is not None:
             rotations[row], translations[row] = found.state.R_cam_head, found.state.t_cam_head
-            angles[row] = head_angles(track.camera(found.state))
+            angles[row] = head_angles_deg(track.camera(found.state))
             values[row], deviations[row] = found.state.values, found.deviations
     lost = np.array([found.state is None for found in frames], bool)
     return Series(
         numbers=np.array([found.frame for found in frames], np.int64),
+        times=np.array([found.time for found in frames]),
         status=tuple(found.status for found in frames),
         rms=np.array([found.rms for found in frames]),
         seen=np.where(lost, np.nan, [found.seen for found in frames]),

@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 
 from mien.arrays import Array, Bool, Float, Int, frozen
 from mien.assets.generic import GenericHead
-from mien.numeric.signed_distance import depths_below
+from mien.numeric.signed_distance import penetration_depths
 from mien.rig.contacts.margins import distances_from, fading, full_path, skin_edges
 
 _PATCH_MM = 14.0
@@ -190,7 +190,7 @@ def _into(
     points: Float[Array, "n 3"], lip: Lip, places: Float[Array, "p 3"]
 ) -> tuple[Array, Array, Array]:
     """Depth of points in a lip whose vertices are at these places, and the nearest places on it."""
-    return depths_below(points, places, lip.triangles, lip.border, _DEEPEST_MM)
+    return penetration_depths(points, places, lip.triangles, lip.border, _DEEPEST_MM)
 
 
 def _ways_out(

@@ -14,9 +14,12 @@ __all__ = ["aligned_photos", "warp_to_raster"]
 
 
 def aligned_photos(examples: ExampleSet) -> Iterator[UInt8[Array, "h w 4"]]:
-    """Each example's photo over the standard image, for people to look at; transparent around.
+    """Each example's photo warped to the standard image, to be looked at; transparent around it.
 
-    Mien itself does not use these: it looks every photo up once, where the result needs it.
+    The composer does not use these: it samples each photo once, where the result needs it.
+
+    Args:
+        examples: of the person.
 
     Yields:
         (h, w, 4) sRGB and alpha, of the standard photo's size.
@@ -38,19 +41,22 @@ def warp_to_raster(
     triangles: Int[Array, "t 3"],
     raster: Raster,
 ) -> UInt8[Array, "y x 3"]:
-    """A photo drawn where the raster of the same triangles over other points lies; else black.
+    """A photo warped triangle by triangle to a raster of other points; black outside.
 
     Args:
+        photo: (h, w, 3) sRGB.
         points: (n, 2) px of the photo.
+        triangles: (t, 3) over the points.
+        raster: of the same triangles over the points to warp to.
     """
     import cv2
 
-    drawn = np.zeros((*raster.mask.shape, 3), np.uint8)
+    warped = np.zeros((*raster.mask.shape, 3), np.uint8)
     corners = points[triangles[raster.triangle_ids[raster.mask]]]
-    places = np.einsum("pk,pkd->pd", raster.barycentrics[raster.mask], corners)
-    # OpenCV counts from the first pixel's centre.
+    positions = np.einsum("pk,pkd->pd", raster.barycentrics[raster.mask], corners)
+    # The centre of OpenCV's first pixel is 0, ours 0.5.
     maps = np.full((*raster.mask.shape, 2), -1, np.float32)
-    maps[raster.mask] = places - 0.5
-    found = cv2.remap(photo, maps, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    drawn[raster.mask] = found[raster.mask]
-    return drawn
+    maps[raster.mask] = positions - 0.5
+    sampled = cv2.remap(photo, maps, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    warped[raster.mask] = sampled[raster.mask]
+    return warped

@@ -1,4 +1,4 @@
-"""What a person's expressions are mixed from: photos, and where the feature points lie in them."""
+"""The examples that a person's expressions are mixed from: photos and their feature points."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Example:
     """One expression of a person: E_i = (G_i, I_i).
 
     Attributes:
-        name: of the example, one of its own in a set.
+        name: of the example, unique in a set.
         photo: (h, w, 3) sRGB.
-        points: (n, 2) px of the photo; those of a face that its photo cuts may lie outside.
+        points: (n, 2) px of the photo; may lie outside of it.
         source: the file or the frame that it was taken from.
 
     Raises:
@@ -48,17 +48,16 @@ class Example:
 
 @dataclass(frozen=True)
 class ExampleSet:
-    """A person's examples and what expressions their points were seen in.
+    """A person's examples, and statistics of the points in more of their expressions.
 
     Attributes:
-        layout: what points there are.
+        layout: of the points.
         examples: neutral first.
         standard: the example in whose picture, mouth open, the subregions are drawn.
-        statistics: (N, n, 2) geometries, px of the neutral photo, of all frames that feed the point
-            statistics; may be more than the examples.
+        statistics: (N, n, 2) geometries, px of the neutral photo, that points are inferred from;
+            of more pictures than the examples.
         subregions: over the standard example's photo.
-        teeth: the examples that the teeth are made from; all where none is named. Those with a
-            closed mouth have none to show.
+        teeth: indices of the examples that show teeth, from which those are made; all if empty.
 
     Raises:
         InputError: no example, two of one name, points of another layout, no such `standard` or
@@ -76,7 +75,7 @@ class ExampleSet:
     teeth: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check that all parts speak of the same points."""
+        """Check that all parts have the same points."""
         count = len(self.layout.names)
         if not self.examples:
             raise InputError("examples", "at least one, the neutral face", "none")
@@ -101,12 +100,12 @@ class ExampleSet:
 
     @property
     def neutral(self) -> Example:
-        """The face at rest, in whose pixels geometries are told."""
+        """The face at rest; geometries are in px of its photo."""
         return self.examples[0]
 
     @property
-    def only(self) -> dict[str, tuple[int, ...]]:
-        """The subregions that some of the examples are for, by name, and which.
+    def subsets(self) -> dict[str, tuple[int, ...]]:
+        """By subregion, the examples that it is made from; all where there is no entry.
 
         Source:
             [Zhang 2006] section 8.
@@ -115,12 +114,12 @@ class ExampleSet:
 
     @cached_property
     def geometries(self) -> Float[Array, "m n 2"]:
-        """(m, n, 2) of the examples: head motion taken out, px of the neutral photo."""
+        """(m, n, 2) points of the examples, head motion compensated, px of the neutral photo."""
         points = np.stack([example.points for example in self.examples])
         return frozen(self.geometry(points))
 
     def geometry(self, points: Float[Array, "*batch n 2"]) -> Float[Array, "*batch n 2"]:
-        """Points in any photo, as they were had the head not moved since the neutral photo.
+        """Points with the head's motion since the neutral photo compensated.
 
         Args:
             points: (..., n, 2) px of one photo each.

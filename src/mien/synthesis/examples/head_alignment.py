@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array
-from mien.numeric.planar_similarity import PlanarMotion, estimate_planar_motion
+from mien.numeric.planar_similarity import PlanarSimilarity, estimate_planar_similarity
 
 __all__ = ["align_to_neutral"]
 
@@ -15,7 +15,7 @@ def align_to_neutral(
     neutral: Float[Array, "n 2"],
     *,
     subset: Int[Array, " k"] | None = None,
-) -> tuple[Float[Array, "*batch n 2"], PlanarMotion]:
+) -> tuple[Float[Array, "*batch n 2"], PlanarSimilarity]:
     """Geometries: the points with the head's motion since the neutral face undone.
 
     Args:
@@ -28,8 +28,8 @@ def align_to_neutral(
         (..., N, 2) px of the neutral face's image; the motion from there to the points.
 
     Raises:
-        InputError: as `estimate_planar_motion`.
-        EstimationError: as `estimate_planar_motion`.
+        InputError: as `estimate_planar_similarity`.
+        EstimationError: as `estimate_planar_similarity`.
 
     Source:
         [Zhang 2006] sec. 12, T^-1(x') after eq. (9); less the neutral points it is the
@@ -38,5 +38,5 @@ def align_to_neutral(
     neutral = check_array("neutral", neutral, (None, 2))
     points = check_array("points", points, (*np.shape(points)[:-2], *neutral.shape))
     used = slice(None) if subset is None else subset
-    motion = estimate_planar_motion(neutral[used], points[..., used, :])
+    motion = estimate_planar_similarity(neutral[used], points[..., used, :])
     return motion.undo(points), motion

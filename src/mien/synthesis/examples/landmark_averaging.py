@@ -1,4 +1,4 @@
-"""Feature points of a picture, steadier than the detector's single look at it."""
+"""Feature points of a picture averaged over several detections, less noisy than a single one."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from mien.synthesis.examples.brow_correction import correct_brows
 __all__ = ["ROTATIONS_DEG", "averaged_points"]
 
 ROTATIONS_DEG = (0.0, 6.0, -6.0)
-"""Degrees by which the face is turned in its plane, each as it is and mirrored."""
+"""In the image plane; each is used as it is and mirrored. A detection takes some 10 ms."""
 
 _SIDE, _WIDTHS = 512, 3.0
-"""Of a view: px, and how many widths of the face. Nearer, a look is less steady."""
-_FAR = 0.05
-"""Points that are off by more than this share of the face's width, in the mean, are another's."""
+"""Of a crop: px, and widths of the face. Tighter crops are noisier."""
+_MAX_DEVIATION = 0.05
+"""Widths of the face; a detection farther off, in the mean, is of another face."""
 
 
 def averaged_points(
@@ -27,78 +27,82 @@ def averaged_points(
     detector: LandmarkDetector,
     pixels: UInt8[Array, "h w 3"],
     landmarks: Float[Array, "478 2"],
-    *,
-    turns: tuple[float, ...] = ROTATIONS_DEG,
 ) -> Float[Array, "n 2"]:
-    """The mean of what the detector sees in a picture, turned and mirrored, brows where they are.
+    """The mean of detections in rotated and mirrored copies of a picture, brows corrected.
 
-    Its landmarks jump by 1 px in a face of 250 px when the picture is turned by a few degrees, and
-    by 2 px when it is mirrored: enough to blur what is mixed. Synthesised pictures gain 0.6 to
-    1.5 dB by steady points (docs/synthesis-quality.md). Examples and the geometry that is
-    asked for must be measured alike: steady points in one of both lose 0.4 to 0.8 dB.
+    The detector's landmarks jump by 1 px in a face of 250 px when the picture is rotated by a few
+    degrees, and by 2 px when it is mirrored: enough to blur what is mixed. Synthesised pictures
+    gain 0.6 to 1.5 dB by averaging. The points of the examples and those that are to be drawn must
+    be measured in the same way: averaged points in one of both lose 0.4 to 0.8 dB.
 
     Args:
-        landmarks: (478, 2) px, from a single look.
-        turns: degrees, each as it is and mirrored; one look in some 10 ms each.
+        layout: of the points.
+        detector: of landmarks.
+        pixels: (h, w, 3) sRGB.
+        landmarks: (478, 2) px, from a single detection.
 
     Returns:
-        (n, 2) px; the single look's where no other finds the face.
+        (n, 2) px; from the single detection where no other finds the face.
 
     Raises:
         InputError: no image, shapes, NaN, a face without width.
     """
     check_image("pixels", pixels)
-    once = layout.from_landmarks(landmarks)
-    width = float(np.ptp(once[:, 0]))
+    single = layout.from_landmarks(landmarks)
+    width = float(np.ptp(single[:, 0]))
     if width == 0:
         raise InputError("landmarks", "a face with a width", "none")
-    # Reduced before it is turned: what is turned is only looked up between pixels.
+    # Reduced before it is rotated, as the warp only interpolates between pixels.
     factor = min(_SIDE / (_WIDTHS * width), 1.0)
     small = shrunk(pixels, max(round(factor * max(pixels.shape[:2])), 1))
     # By axis: sides are whole numbers of pixels.
-    by = np.array(small.shape[1::-1]) / pixels.shape[1::-1]
-    found = [
-        _seen(layout, detector, small, by * once, np.radians(turn), mirrored) / by
-        for turn in turns
+    scale = np.array(small.shape[1::-1]) / pixels.shape[1::-1]
+    detections = [
+        _detected(layout, detector, small, scale * single, np.radians(angle), mirrored) / scale
+        for angle in ROTATIONS_DEG
         for mirrored in (False, True)
     ]
-    # Another face may be larger in a cut-out than the one that is meant.
-    near = [p for p in found if np.linalg.norm(p - once, axis=1).mean() < _FAR * width]
-    return correct_brows(layout, pixels, np.mean(near, axis=0) if near else once)
+    # Another face may be larger in a crop than this one.
+    inliers = [
+        points
+        for points in detections
+        if np.linalg.norm(points - single, axis=1).mean() < _MAX_DEVIATION * width
+    ]
+    return correct_brows(layout, pixels, np.mean(inliers, axis=0) if inliers else single)
 
 
-def _seen(
+def _detected(
     layout: FeatureLayout,
     detector: LandmarkDetector,
     pixels: UInt8[Array, "h w 3"],
     points: Float[Array, "n 2"],
-    turn: float,
+    angle: float,
     mirrored: bool,
 ) -> Float[Array, "n 2"]:
-    """The points as one look at the face, turned, tells them; infinity where it tells none."""
+    """The points from one rotated crop of the face; infinity where no face is found."""
     import cv2
 
-    matrix, offset = _view(points, turn, mirrored)
-    # OpenCV counts from the first pixel's centre.
+    matrix, offset = _crop_transform(points, angle, mirrored)
+    # The centre of OpenCV's first pixel is 0, ours 0.5.
     shifted = offset + matrix @ [0.5, 0.5] - 0.5
-    view = cv2.warpAffine(
+    crop = cv2.warpAffine(
         pixels, np.column_stack([matrix, shifted]), (_SIDE, _SIDE), borderMode=cv2.BORDER_REPLICATE
     )
-    face = detector.detect_fast(np.asarray(view))
+    face = detector.detect_fast(np.asarray(crop))
     if face is None:
         return np.full(points.shape, np.inf)
-    seen = layout.from_landmarks(face.points[:, :2])
-    back: Array = np.linalg.solve(matrix, (seen - offset).T).T
-    return back[layout.mirror] if mirrored else back
+    in_crop = layout.from_landmarks(face.points[:, :2])
+    restored: Array = np.linalg.solve(matrix, (in_crop - offset).T).T
+    return restored[layout.mirror] if mirrored else restored
 
 
-def _view(
-    points: Float[Array, "n 2"], turn: float, mirrored: bool
+def _crop_transform(
+    points: Float[Array, "n 2"], angle: float, mirrored: bool
 ) -> tuple[Float[Array, "2 2"], Float[Array, " 2"]]:
-    """A turn around the face's middle, which comes to the middle of the view."""
-    cos, sin = np.cos(turn), np.sin(turn)
+    """Rotation about the face's centre, which comes to the centre of the crop."""
+    cos, sin = np.cos(angle), np.sin(angle)
     matrix = np.array([[cos, -sin], [sin, cos]])
     if mirrored:
         matrix[0] *= -1
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    return matrix, _SIDE / 2 - matrix @ middle
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    return matrix, _SIDE / 2 - matrix @ centre

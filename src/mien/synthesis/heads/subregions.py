@@ -19,10 +19,10 @@ __all__ = ["HeadSubregions", "head_subregions"]
 
 _PX_PER_MM = 2.0
 _MARGIN_MM = 10.0
-_FACING = 0.3
-"""Of the normal towards the front: what turns away more is seen too flat to be drawn on."""
-_OUTLINE = 0.5
-"""Of what a drawing holds of the face, as far as which it is drawn: there it fades in pictures."""
+_MIN_FACING = 0.3
+"""z of a unit normal; surfaces that are turned away more are too oblique to be drawn on."""
+_MIN_COVERAGE = 0.5
+"""Sum of the drawn weights up to which skin counts as drawn on; around the face they fade."""
 _PARTS = {
     "left_eyeball": "left_eye",
     "right_eyeball": "right_eye",
@@ -30,7 +30,7 @@ _PARTS = {
     "lower_teeth": "teeth",
     "tongue": "teeth",
 }
-"""Parts of the mesh that are subregions by themselves; those hold nothing of the skin."""
+"""The subregion of each of these parts of the mesh; they have no skin."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class HeadSubregions:
 
     Attributes:
         names: R of them, as in pictures.
-        fades: (V, R) each vertex's shares, which sum to 1.
+        fades: (V, R) blend weights of each vertex, which sum to 1.
         members: of each, the indices of the feature points within it or on its boundary.
     """
 
@@ -52,25 +52,25 @@ class HeadSubregions:
 def head_subregions() -> HeadSubregions:
     """The subregions that ship with mien, on the mesh of the generic head.
 
-    They are drawn over its feature points as the front shows them. Eyeballs, teeth and tongue are
-    those of their own. Skin that the drawing does not reach, behind the lips and the lids, below
-    the chin and around the face, goes on smoothly from where it does: a jaw takes what hangs on it
-    along, and what expressions leave still stays so.
+    They are drawn over its feature points in the front view. Eyeballs are subregions, teeth and
+    tongue are one. To skin that the drawing does not reach, behind the lips and the lids, below the
+    chin and around the face, the weights are extended smoothly: what lies below the jaw moves with
+    it, and what expressions do not move stays.
     """
     generic, layout = load_generic_head(), load_feature_layout()
     points = feature_points_on(generic.mesh.vertices)
     front = points[:, :2] * [1, -1]
-    around = np.vstack([front, layout.frame(front)])
-    low = around.min(axis=0) - _MARGIN_MM
-    width, height = np.ceil((np.ptp(around, axis=0) + 2 * _MARGIN_MM) * _PX_PER_MM).astype(int)
+    framed = np.vstack([front, layout.frame(front)])
+    low = framed.min(axis=0) - _MARGIN_MM
+    width, height = np.ceil((np.ptp(framed, axis=0) + 2 * _MARGIN_MM) * _PX_PER_MM).astype(int)
     drawn = default_subregions(layout, (front - low) * _PX_PER_MM, (int(width), int(height)))
-    places = (generic.mesh.vertices[:, :2] * [1, -1] - low) * _PX_PER_MM
-    own = [name in _PARTS.values() for name in drawn.names]
-    fades = _sampled(drawn.fades, places)
-    fades[:, own] = 0
+    positions = (generic.mesh.vertices[:, :2] * [1, -1] - low) * _PX_PER_MM
+    without_skin = [name in _PARTS.values() for name in drawn.names]
+    fades = _sampled(drawn.fades, positions)
+    fades[:, without_skin] = 0
     total = fades.sum(axis=1, keepdims=True)
-    drawn_on = _drawn_on(generic) & (total[:, 0] > _OUTLINE)
-    fades = harmonic_extension(fades / np.maximum(total, _OUTLINE), drawn_on)
+    drawn_on = _drawn_on(generic) & (total[:, 0] > _MIN_COVERAGE)
+    fades = harmonic_extension(fades / np.maximum(total, _MIN_COVERAGE), drawn_on)
     for part, name in _PARTS.items():
         fades[part_vertices(generic, part)] = np.array(drawn.names) == name
     swapped = [drawn.names.index(_other_side(name)) for name in drawn.names]
@@ -79,18 +79,18 @@ def head_subregions() -> HeadSubregions:
     return HeadSubregions(drawn.names, frozen(fades), drawn.members)
 
 
-def _sampled(fades: Float[Array, "h w r"], places: Float[Array, "v 2"]) -> Float[Array, "v r"]:
-    """Between the pixels, linearly; outside of the picture there are none."""
+def _sampled(fades: Float[Array, "h w r"], positions: Float[Array, "v 2"]) -> Float[Array, "v r"]:
+    """Bilinear interpolation; 0 outside of the picture."""
     from scipy.ndimage import map_coordinates
 
-    rows, columns = places[:, 1] - 0.5, places[:, 0] - 0.5
+    rows, columns = positions[:, 1] - 0.5, positions[:, 0] - 0.5
     layers = np.moveaxis(fades, 2, 0)
     return np.stack([map_coordinates(layer, [rows, columns], order=1) for layer in layers], axis=1)
 
 
 def _drawn_on(generic: GenericHead) -> Bool[Array, " v"]:
-    """Skin that faces the front and lies behind nothing."""
-    facing: Array = (generic.mesh.vertex_normals()[:, 2] > _FACING) & ~behind_lips_and_lids()
+    """Skin that faces the front and is not hidden by lips or lids."""
+    facing: Array = (generic.mesh.vertex_normals()[:, 2] > _MIN_FACING) & ~behind_lips_and_lids()
     skin = np.zeros(len(facing), bool)
     skin[part_vertices(generic, "skin")] = True
     return facing & skin

@@ -16,7 +16,8 @@ from mien.rig.followers import part_vertices
 from mien.rig.gaze import SIDES
 from mien.rig.rig import Rig
 from mien.rig.state import PosedFace
-from mien.synthesis.heads.feature_points import feature_points_on, thin_plate_weights
+from mien.synthesis.heads.feature_points import feature_points_on
+from mien.synthesis.heads.skin_interpolation import thin_plate_weights
 from mien.synthesis.heads.subregions import head_subregions
 from mien.synthesis.inference.coefficients import coefficients_from_offsets, mixture_distances
 from mien.synthesis.inference.conditional import ConditionalGaussian

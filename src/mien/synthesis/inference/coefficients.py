@@ -9,7 +9,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array
 from mien.errors import InputError
-from mien.numeric.solvers.simplex import nearest_mixture
+from mien.numeric.solvers.simplex import simplex_quadratic_program
 from mien.synthesis.examples.example_set import ExampleSet
 
 __all__ = [
@@ -94,7 +94,7 @@ def coefficients(
         distance_penalty=distance_penalty,
         slack=slack,
         tied=tied,
-        only=example_set.only,
+        subsets=example_set.subsets,
     )
 
 
@@ -105,7 +105,7 @@ def coefficients_from_offsets(
     distance_penalty: float = DISTANCE_PENALTY,
     slack: float = 0.0,
     tied: Sequence[Collection[str]] | None = None,
-    only: Mapping[str, Sequence[int]] | None = None,
+    subsets: Mapping[str, Sequence[int]] | None = None,
 ) -> Float[Array, "R m"]:
     """The same of any geometries, in the plane or in space.
 
@@ -115,9 +115,9 @@ def coefficients_from_offsets(
         distance_penalty: as for `coefficients`.
         slack: as for `coefficients`.
         tied: as for `coefficients`.
-        only: by subregion, the examples that it is made from where they are near: teeth from those
-            that show teeth, unless the mouth is shut. In between it is made from these and from
-            all, so that a mouth that opens does so without a jump. Tied subregions ignore it.
+        subsets: by subregion, indices of the examples that it is made from where they are near:
+            teeth from those that show teeth, unless the mouth is shut. In between, both mixtures
+            are blended, so that a mouth opens without a jump. Tied subregions ignore it.
 
     Returns:
         (R, m) coefficients; each row sums to 1.
@@ -140,7 +140,7 @@ def coefficients_from_offsets(
             members = np.unique(np.concatenate([subregions.members[row] for row in rows]))
         flat = offsets[:, members].reshape(len(offsets), -1)
         gram = flat @ flat.T
-        subset = (only or {}).get(subregions.names[rows[0]], ()) if len(rows) == 1 else ()
+        subset = (subsets or {}).get(subregions.names[rows[0]], ()) if len(rows) == 1 else ()
         weight = _subset_weight(gram.diagonal(), subset)
         if weight > 0:
             few = _mixture(gram[np.ix_(subset, subset)], distance_penalty, slack)
@@ -167,7 +167,7 @@ def _subset_weight(squares: Float[Array, " m"], subset: Sequence[int]) -> float:
 
 def _mixture(gram: Float[Array, "m m"], distance_penalty: float, slack: float) -> Array:
     """Coefficients of the examples whose offsets have these inner products."""
-    return nearest_mixture(gram, slack=slack, penalty=distance_penalty * gram.diagonal())
+    return simplex_quadratic_program(gram, slack=slack, penalty=distance_penalty * gram.diagonal())
 
 
 def mixture_distances(

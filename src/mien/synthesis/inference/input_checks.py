@@ -7,7 +7,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int, check_array
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import InputError
-from mien.numeric.planar_similarity import estimate_planar_motion
+from mien.numeric.planar_similarity import estimate_planar_similarity
 from mien.synthesis.examples.example_set import ExampleSet
 from mien.synthesis.examples.head_alignment import align_to_neutral
 from mien.synthesis.inference.displacement_model import check_known
@@ -55,7 +55,7 @@ def face_width(layout: FeatureLayout, points: Float[Array, "n 2"]) -> float:
     """
     points = check_array("points", points, (len(layout.names), 2))
     rigid = layout.rigid
-    return float(estimate_planar_motion(layout.template[rigid], points[rigid]).scale)
+    return float(estimate_planar_similarity(layout.template[rigid], points[rigid]).scale)
 
 
 def look_mirrored(
@@ -147,7 +147,7 @@ def _alignment_rms(source: Float[Array, "k 2"], target: Float[Array, "k 2"]) -> 
     """Root of the mean squared distance after the best motion, in the source's px."""
     if len(source) < 2:
         raise InputError("known", "at least 2 points", len(source))
-    residual = estimate_planar_motion(source, target).undo(target) - source
+    residual = estimate_planar_similarity(source, target).undo(target) - source
     return float(np.sqrt((residual**2).sum(axis=1).mean()))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, Int, frozen
 from mien.numeric.kernels.jit import njit
 from mien.numeric.kernels.threads import for_row_bands
-from mien.numeric.raster.rasterizer import Raster, rasterize_rows, unfilled
+from mien.numeric.raster.rasterizer import Raster, empty_raster, rasterize_rows
 from mien.render.mipmap import Four, Pyramids, level_of_detail, place_lookup, weighted_texels
 from mien.render.mix import Painted
 from mien.rig.state import PosedFace
@@ -178,7 +178,7 @@ def _placed(
     # As sharp as a picture of four samples a pixel (render.mix).
     shades[:, 0] = level_of_detail(painted.texels, points, painted.triangles) - 0.5
     surface = _Surface(compared, painted.triangles, painted.uvs, shades)
-    return _Placed(surface, places, frozen(points), frozen(depth), unfilled(*view.size))
+    return _Placed(surface, places, frozen(points), frozen(depth), empty_raster(*view.size))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -1,0 +1,16 @@
+"""The public names of `mien.animate`: this is their only list; `mien.lazy` reads it."""
+
+from mien.animate.curves import Curve as Curve
+from mien.animate.curves import constant as constant
+from mien.animate.from_track import track_timeline as track_timeline
+from mien.animate.layers import Blink as Blink
+from mien.animate.layers import Breathing as Breathing
+from mien.animate.timeline import Clip as Clip
+from mien.animate.timeline import Layer as Layer
+from mien.animate.timeline import Moment as Moment
+from mien.animate.timeline import Placement as Placement
+from mien.animate.timeline import Timeline as Timeline
+from mien.io.timeline.timeline_file import load_timeline as load_timeline
+from mien.io.timeline.timeline_json import save_timeline as save_timeline
+from mien.pipelines.animate import Take as Take
+from mien.pipelines.animate import animate_head as animate_head

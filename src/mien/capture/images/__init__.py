@@ -1,0 +1,1 @@
+"""Photos of all kinds: decoding, orientation, colour."""

@@ -1,0 +1,1 @@
+"""Clips and cameras: decoding, orientation, choice of frames."""

@@ -1,0 +1,1 @@
+"""Feature points as files, also of other programs."""

@@ -1,0 +1,1 @@
+"""Live Link and VMC: files and packets."""

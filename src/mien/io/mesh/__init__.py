@@ -1,0 +1,1 @@
+"""Meshes and heads as `.glb`, `.obj` and `.usdz`."""

@@ -1,0 +1,1 @@
+"""Timelines as JSON, and performances for other programs."""

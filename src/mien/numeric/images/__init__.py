@@ -1,0 +1,1 @@
+"""Sampling, optical flow and hole filling of images."""

@@ -1,0 +1,1 @@
+"""Rasterizing triangles."""

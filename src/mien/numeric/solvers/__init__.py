@@ -1,0 +1,1 @@
+"""Least squares, quadratic programs, acceleration."""

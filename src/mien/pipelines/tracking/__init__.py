@@ -1,0 +1,1 @@
+"""The parts of tracking a video: preparation, the run, its outputs."""

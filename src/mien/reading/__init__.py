@@ -1,0 +1,1 @@
+"""Strict readers of untrusted files: sizes, types and values are checked."""

@@ -1,0 +1,1 @@
+"""Bundle adjustment: all cameras and all points at once."""

@@ -1,0 +1,1 @@
+"""Cameras from feature points by alternating linear least squares."""

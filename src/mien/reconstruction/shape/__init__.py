@@ -1,0 +1,1 @@
+"""The surface that the cameras and the observed points determine."""

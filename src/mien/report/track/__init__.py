@@ -1,0 +1,1 @@
+"""Plots, overlays and sheets of a track."""

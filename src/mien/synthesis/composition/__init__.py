@@ -1,0 +1,1 @@
+"""From coefficients to a picture: warping, mixing and blending subregions."""

@@ -1,0 +1,1 @@
+"""Which pictures become examples, their points and their exposure."""

@@ -1,0 +1,1 @@
+"""Synthesis on a head: feature points in space."""

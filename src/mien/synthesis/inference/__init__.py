@@ -1,0 +1,1 @@
+"""From feature points to coefficients: all points from some, mixtures, checks."""

@@ -1,0 +1,1 @@
+"""What is compared: the drawing, the frame, and the filters of both."""

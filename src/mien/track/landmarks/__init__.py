@@ -1,0 +1,1 @@
+"""A starting pose from the detector's landmarks."""

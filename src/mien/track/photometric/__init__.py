@@ -1,0 +1,1 @@
+"""Fitting the drawn head to a frame by its pixels."""
