@@ -7,13 +7,16 @@ import numpy as np
 from benchmarks.scenes import Scene
 from mien.arrays import Array
 from mien.numeric.solvers.robust import loss_named
+from mien.reconstruction.bundle.adjustment import Posterior, unknown_poses
+from mien.reconstruction.bundle.gauge import similarity_constraints
 from mien.reconstruction.bundle.problem import (
-    POSE_SIZE,
-    Bundle,
-    BundleData,
-    linearize_bundle,
-    similarity_constraints,
+    BundleProblem,
+    BundleState,
+    FocalGroups,
+    Observations,
+    PointPrior,
 )
+from mien.reconstruction.bundle.projection import POSE_SIZE
 
 __all__ = ["within_shares"]
 
@@ -51,26 +54,23 @@ def within_shares(
 
 def _covariance(scene: Scene, sigma_px: float) -> Array:
     """Of all poses and log focal lengths at the truth, after points are aligned."""
-    photos = len(scene.cameras)
-    seen = np.isfinite(scene.image_points[..., :1])
-    principal = np.stack([camera.principal for camera in scene.cameras])
+    photos, count = len(scene.cameras), len(scene.points)
+    photo, point = np.nonzero(np.isfinite(scene.image_points[..., 0]))
     log_focal = np.log([camera.focal_px for camera in scene.cameras])
-    data = BundleData(
-        image=np.where(seen, scene.image_points - principal[:, None], 0.0),
-        precision=seen[..., 0] / sigma_px,
-        group=np.arange(photos),
-        log_focal_mean=log_focal,
-        log_focal_precision=np.zeros(photos),
-        shape=None,
-        loss=loss_named("linear"),
+    groups = FocalGroups(np.arange(photos), log_focal, np.full(photos, np.inf))
+    problem = BundleProblem(
+        scene.cameras,
+        Observations(
+            photo,
+            point,
+            scene.image_points[photo, point],
+            np.full(len(photo), sigma_px),
+            np.ones(len(photo), bool),
+        ),
+        PointPrior(np.zeros((count, 3)), np.zeros((0, count, 3)), np.zeros((count, 3, 3))),
+        unknown_poses(scene.cameras, groups),
     )
-    truth = Bundle(
-        R=np.stack([camera.R_cam_head for camera in scene.cameras]),
-        t=np.stack([camera.t_cam_head for camera in scene.cameras]),
-        log_focal=log_focal,
-        points=scene.points,
-        coefficients=np.zeros(0),
-    )
-    system = linearize_bundle(truth, data)
+    truth = BundleState.of(scene.cameras, scene.points, groups.group, 0)
+    system = Posterior(problem, loss_named("linear"), None).normal_equations(truth)
     held = similarity_constraints(truth.points, ~system.open_blocks())
     return system.covariance(held)[0]

@@ -82,7 +82,7 @@ def filmed(clip: Path, layout: FeatureLayout, detector: LandmarkDetector) -> Fil
         frames=tuple(frames),
         index=np.array(index),
         landmarks=landmarks,
-        points=layout.mixes @ landmarks,
+        points=layout.landmark_weights @ landmarks,
         pose=np.array([yaw_pitch(face.R_cam_head) for face in faces]),
         sharpness=np.array(sharpness),
     )

@@ -16,7 +16,7 @@ from mien.capture.source import CapturedView
 from mien.numeric.rotation import rotation_from_vector
 from mien.reconstruction.expression.known_head import KnownHead
 from mien.reconstruction.features import Features, gather_features
-from mien.reconstruction.observations import Sightings
+from mien.reconstruction.observations import SurfaceObservations
 from people import person
 
 NEUTRAL = person(3)
@@ -95,7 +95,7 @@ def features_of(vertices: Array, cameras: Sequence[Camera]) -> Features:
 
 def skin_seen(
     vertices: Array, cameras: Sequence[Camera], *, count: int, sigma_mm: float = 0.4
-) -> Sightings:
+) -> SurfaceObservations:
     """Places of the face's skin, exactly where these cameras see them on this head."""
     rng = np.random.default_rng(7)
     mesh = GENERIC.mesh
@@ -111,7 +111,7 @@ def skin_seen(
         barycentrics = rng.dirichlet(np.ones(3), size=count)
         places = np.einsum("mc,mcd->md", barycentrics, vertices[corners])
         parts.append(
-            Sightings(
+            SurfaceObservations(
                 corners,
                 barycentrics,
                 np.zeros((count, 3)),
@@ -128,13 +128,13 @@ def skin_seen(
 
 def vertices_seen(
     vertices: Array, cameras: Sequence[Camera], seen: Array, *, sigma_mm: float = 0.4
-) -> Sightings:
+) -> SurfaceObservations:
     """These vertices, exactly where every one of the cameras sees them."""
     which = np.tile(seen, len(cameras))
-    return Sightings(
+    return SurfaceObservations(
         corners=np.repeat(which[:, None], 3, axis=1),
         barycentrics=np.tile([1.0, 0.0, 0.0], (len(which), 1)),
-        beside=np.zeros((len(which), 3)),
+        offset=np.zeros((len(which), 3)),
         photo=np.repeat(np.arange(len(cameras)), len(seen)),
         image_points=np.concatenate([item.project(vertices[seen]) for item in cameras]),
         sigma_mm=np.full(len(which), sigma_mm),

@@ -9,10 +9,15 @@ _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
 _BYTE = 0xDC00  # where Python puts the bytes of a file's name that are no text
 
 
-def escaped(text: str) -> str:
-    """Text that any file in UTF-8 can hold: bytes that are no text, and what steers terminals,
+def one_line(message: object) -> str:
+    """A library's message without its line breaks."""
+    return " ".join(str(message).split())
 
-    are written as \\xNN.
+
+def escaped(text: str) -> str:
+    r"""Text that any file in UTF-8 can hold and any terminal can show.
+
+    Bytes that are no text, and control characters, are written as \xNN.
     """
 
     def name(match: re.Match[str]) -> str:
@@ -56,11 +61,11 @@ class FileFormatError(MienError):
 
 
 class OtherPointsError(FileFormatError):
-    """A whole file of points, but of a kind that has nothing known in common with mien's."""
+    """A whole file of points, but of a kind whose relation to mien's points is not known."""
 
 
 class EstimationError(MienError):
-    """The data cannot answer the question, whoever asks; the message says why."""
+    """The data do not determine what is asked for; the message says why."""
 
 
 class DocumentError(Exception):

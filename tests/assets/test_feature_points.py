@@ -53,15 +53,15 @@ def test_the_template_is_symmetric_and_one_wide(layout: FeatureLayout) -> None:
 
 
 def test_every_point_is_a_mix_of_landmarks(layout: FeatureLayout) -> None:
-    np.testing.assert_allclose(layout.mixes.sum(axis=1), 1, atol=1e-12)
-    assert (layout.mixes >= 0).all()
-    assert np.linalg.matrix_rank(layout.mixes) >= 128  # Teeth come from the lips.
+    np.testing.assert_allclose(layout.landmark_weights.sum(axis=1), 1, atol=1e-12)
+    assert (layout.landmark_weights >= 0).all()
+    assert np.linalg.matrix_rank(layout.landmark_weights) >= 128  # Teeth come from the lips.
 
 
 def test_pupils_are_the_detectors_irises_in_all_sets_of_eyes(layout: FeatureLayout) -> None:
     for side, landmark in (("right", RIGHT_IRIS), ("left", LEFT_IRIS)):
         index = layout.index(f"{side}_pupil")
-        np.testing.assert_array_equal(layout.mixes[index], np.eye(478)[landmark])
+        np.testing.assert_array_equal(layout.landmark_weights[index], np.eye(478)[landmark])
         sets = [
             name
             for names, level in zip(layout.set_names, layout.sets, strict=True)
@@ -108,11 +108,11 @@ def test_sets_of_both_sides_are_mirror_images(layout: FeatureLayout) -> None:
 
 
 def test_triangles_cover_the_template_once_and_alike_on_both_sides(layout: FeatureLayout) -> None:
-    places = np.vstack([layout.template, layout.surround])
+    places = np.vstack([layout.template, layout.template_frame])
     a, b, c = places[layout.triangles].transpose(1, 0, 2)
     areas = np.cross(np.c_[b - a, np.zeros(len(a))], np.c_[c - a, np.zeros(len(a))])[:, 2] / 2
     assert (areas > 1e-4).all()
-    x, y = layout.surround.T
+    x, y = layout.template_frame.T
     hull = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
     assert areas.sum() == pytest.approx(hull, rel=1e-4)
     assert set(layout.triangles.ravel()) == set(range(len(places)))
@@ -145,7 +145,7 @@ def test_drawn_lines_are_edges(layout: FeatureLayout, line: list[str]) -> None:
 def test_the_frame_follows_the_head_and_no_expression(layout: FeatureLayout) -> None:
     turn = 80 * np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
     points = layout.template @ turn.T + [300, 200]
-    np.testing.assert_allclose(layout.frame(points), layout.surround @ turn.T + [300, 200])
+    np.testing.assert_allclose(layout.frame(points), layout.template_frame @ turn.T + [300, 200])
     moved = points.copy()
     moved[layout.index("menton")] += [3, 40]
     moved[layout.index("left_brow_upper.1")] -= [0, 12]

@@ -218,7 +218,7 @@ def test_a_users_drawing_is_used(layout: FeatureLayout, points: np.ndarray) -> N
         groups=("skin",),
         corners=drawing.corners[:1],
         blends=(0.06,),
-        also=drawing.also[:1],
+        extra_points=drawing.extra_points[:1],
     )
     subregions = default_subregions(layout, points, SIZE, drawing=whole)
     assert subregions.names == ("face",)
@@ -235,7 +235,7 @@ def test_a_region_that_no_point_tells_of_is_refused(
         drawing,
         names=("speck", *drawing.names[1:]),
         corners=(np.repeat(corner, 3, axis=0), *drawing.corners[1:]),
-        also=(np.arange(0), *drawing.also[1:]),
+        extra_points=(np.arange(0), *drawing.extra_points[1:]),
     )
     with pytest.raises(InputError, match="members of speck: expected indices of points, one at"):
         default_subregions(layout, points, (400, 400), drawing=bare)

@@ -11,7 +11,7 @@ import mien.assets
 from mien.arrays import Array
 from mien.capture import source
 from mien.capture.annotations import AnnotationNames
-from mien.capture.faces.detector import NO_FACE
+from mien.capture.faces.detector import NO_FACE_FOUND
 from mien.capture.images.photos import Photo
 from mien.capture.source import TO_BE_PLACED, load_capture
 from mien.capture.video.picked_frames import PickedFrames
@@ -123,7 +123,7 @@ def test_photo_without_a_face_is_left_out_of_an_expression_without_faces(
     put(tmp_path / "joy" / "b.png", wall)
     capture = load_capture(tmp_path)
     assert list(capture.expressions) == ["neutral"]
-    assert capture.notes == (f"b.png: left out: {NO_FACE}",)
+    assert capture.notes == (f"b.png: left out: {NO_FACE_FOUND}",)
 
 
 def test_the_same_photo_without_a_face_twice(
@@ -232,7 +232,7 @@ def test_expressions_of_a_video_without_a_face_are_left_out(
     capture = load_capture(tmp_path / "a.mp4", expressions=3)
     assert asked == [3]
     assert list(capture.expressions) == ["neutral", "smile"]
-    assert capture.notes == ("a.mp4: HDR video", f"frown.png: left out: {NO_FACE}")
+    assert capture.notes == ("a.mp4: HDR video", f"frown.png: left out: {NO_FACE_FOUND}")
 
 
 def test_seven_views_of_a_scan(shared: Path) -> None:

@@ -12,7 +12,7 @@ from mien.reconstruction.fit import Fit, FitOptions, fit_views
 from mien.reconstruction.outliers import Mark, PhotoFit
 from mien.render.orbit import orbit_camera
 from mien.report import ReportInput, render_report
-from mien.report.page import head_angles
+from mien.report.page import head_angles_deg
 from people import camera, person, photographed
 
 GENERIC = load_generic_head()
@@ -126,7 +126,7 @@ def test_a_page_without_a_turntable(report_input: ReportInput) -> None:
 
 def test_angles_of_a_camera_that_goes_around() -> None:
     """A camera on the subject's right sees the head turned to its own left, and so on."""
-    yaw, pitch, roll = head_angles(camera(0))
+    yaw, pitch, roll = head_angles_deg(camera(0))
     np.testing.assert_allclose([yaw, pitch, roll], 0, atol=1e-9)
     for offset, expected in (([-300, 0, 700], (1, 0)), ([0, 300, 700], (0, 1))):
         forward = -np.array(offset) / np.linalg.norm(offset)
@@ -137,7 +137,7 @@ def test_angles_of_a_camera_that_goes_around() -> None:
         seen = type(seen)(1000, 1000, 2000.0, rotation, -rotation @ np.array(offset, float))
         np.testing.assert_allclose(seen.center, offset, atol=1e-9)
         angle = np.degrees(np.arctan2(300, 700))
-        np.testing.assert_allclose(head_angles(seen)[:2], np.array(expected) * angle, atol=1e-9)
+        np.testing.assert_allclose(head_angles_deg(seen)[:2], np.array(expected) * angle, atol=1e-9)
 
 
 def test_roll_is_towards_the_right_shoulder() -> None:
@@ -149,11 +149,11 @@ def test_roll_is_towards_the_right_shoulder() -> None:
     seen = type(seen)(*(1000, 1000, 2000.0), lean @ seen.R_cam_head, seen.t_cam_head)
     top, origin = seen.to_camera(np.array([[0.0, 100, 0], [0, 0, 0]]))
     assert top[0] < origin[0]
-    np.testing.assert_allclose(head_angles(seen), (0, 0, 20), atol=1e-9)
+    np.testing.assert_allclose(head_angles_deg(seen), (0, 0, 20), atol=1e-9)
 
 
 @pytest.mark.parametrize("angles", [(30, 0, 0), (40, 25, -15), (-100, 5, 3), (0, -60, 20)])
 def test_angles_are_those_that_render_takes(angles: tuple[float, float, float]) -> None:
     yaw, pitch, roll = np.radians(angles)
     seen = orbit_camera(-yaw, pitch, roll, width=100, height=100, vertices=GENERIC.mesh.vertices)
-    np.testing.assert_allclose(head_angles(seen), angles, atol=1e-9)
+    np.testing.assert_allclose(head_angles_deg(seen), angles, atol=1e-9)

@@ -13,7 +13,7 @@ from mien.render.shade import render
 from mien.rig.expression_textures import Looks, Photographed, paint_expressions
 from mien.rig.shading import Openings, brightness_at
 from mien.texture.atlas import atlas_surface
-from mien.texture.surface import parts_of
+from mien.texture.surface import part_mask
 from posable import REST, explained_by
 
 SIDE = 512
@@ -42,7 +42,7 @@ LIGHT = {
 
 
 def texels(part: str) -> Array:
-    return parts_of(SURFACE, GENERIC.mesh, part)
+    return part_mask(SURFACE, GENERIC.mesh, part)
 
 
 def truth(name: str) -> Array:

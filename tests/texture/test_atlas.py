@@ -6,7 +6,7 @@ import pytest
 from mien.errors import InputError
 from mien.mesh import Mesh
 from mien.texture.atlas import atlas_surface, fill_gutters
-from mien.texture.surface import cropped, mirrored, parts_of, restricted
+from mien.texture.surface import cropped, mirrored, part_mask, restricted
 from shapes import ellipsoid, with_nose
 
 
@@ -34,7 +34,7 @@ def test_the_size_of_a_texel() -> None:
 def test_parts_are_told_apart() -> None:
     mesh = with_nose(ellipsoid())
     surface = atlas_surface(mesh, width=200, height=100)
-    nose = parts_of(surface, mesh, "nose", "no such part")
+    nose = part_mask(surface, mesh, "nose", "no such part")
     columns = np.flatnonzero(nose.any(axis=0))
     assert (columns[0], columns[-1]) == (160, 199)
     only = restricted(cropped(surface, np.s_[:, 150:]), nose[:, 150:])

@@ -5,7 +5,7 @@ import pytest
 
 from mien.texture.atlas import atlas_surface
 from mien.texture.blend import blend_views
-from mien.texture.visibility import prepare_view, sight
+from mien.texture.visibility import prepare_view, surface_visibility
 from shapes import camera_at, ellipsoid
 
 
@@ -22,7 +22,7 @@ def test_colours_are_the_convex_combination_by_visibility_times_certainty(power:
     ]
     gains = np.array([[1, 1, 1], [1.1, 1, 0.9], [1, 1, 1]])
     blend = blend_views(surface, views, gains, feather_mm=20, certainty_power=power)
-    seen = [sight(surface, view, feather_mm=20) for view in views]
+    seen = [surface_visibility(surface, view, feather_mm=20) for view in views]
     weights = np.stack([s.feathered * s.certainty**power for s in seen])  # g_k = F_k P_k
     np.testing.assert_allclose(blend.coverage, weights.sum(axis=0), rtol=1e-4, atol=1e-6)
     lit = blend.coverage > 1e-3
@@ -38,7 +38,7 @@ def test_grazing_views_are_not_trusted_by_themselves() -> None:
     surface = atlas_surface(mesh, width=80, height=60)
     view = prepare_view(mesh, camera_at(0, mesh), np.full((320, 320, 3), 99, np.uint8))
     blend = blend_views(surface, [view], feather_mm=0.1, certainty_power=1)
-    certainty = sight(surface, view, feather_mm=0.1).certainty
+    certainty = surface_visibility(surface, view, feather_mm=0.1).certainty
     assert not blend.confidence[certainty < 0.17].any()
     np.testing.assert_allclose(blend.confidence[certainty > 0.4], 1)
     # Where the outline's margin and the ramp of the visibility leave it alone.
@@ -56,7 +56,7 @@ def test_colours_fade_out_between_the_two_cosines(fade: tuple[float, float]) -> 
     photo = np.full((320, 320, 3), 99, np.uint8)
     view = prepare_view(mesh, camera_at(0, mesh), photo, outline_mm=0)
     blend = blend_views(surface, [view], feather_mm=0.1, fade=fade)
-    seen = sight(surface, view, feather_mm=0.1, least_certainty=fade[0])
+    seen = surface_visibility(surface, view, feather_mm=0.1, min_certainty=fade[0])
     whole = seen.feathered > 0.99
     expected = np.clip((seen.certainty - fade[0]) / (fade[1] - fade[0]), 0, 1)
     np.testing.assert_allclose(blend.confidence[whole], expected[whole], atol=1e-5)

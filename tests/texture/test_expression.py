@@ -12,8 +12,8 @@ from mien.camera import Camera
 from mien.mesh import Mesh
 from mien.render.shade import render
 from mien.texture.atlas import atlas_surface
-from mien.texture.expression import ExpressionLook, look_at_expression
-from mien.texture.surface import SurfaceMap, over_vertices
+from mien.texture.expression import TextureLayer, extract_expression_layer
+from mien.texture.surface import SurfaceMap, interpolate_vertex_values
 from shapes import camera_at, ellipsoid, smooth_texture, with_nose
 
 SIZE = (512, 256)
@@ -51,8 +51,8 @@ def look(
     below: Array | None = None,
     mesh: Mesh = MESH,
     surface: SurfaceMap = SURFACE,
-) -> ExpressionLook:
-    return look_at_expression(
+) -> TextureLayer:
+    return extract_expression_layer(
         mesh,
         cameras or [FRONT],
         photos,
@@ -64,7 +64,7 @@ def look(
 
 
 @pytest.fixture(scope="module")
-def found() -> ExpressionLook:
+def found() -> TextureLayer:
     return look([photo(wrinkled())])
 
 
@@ -73,9 +73,9 @@ def off(texture: Array, true: Array) -> Array:
     return np.abs(texture.astype(int) - true).max(axis=2)
 
 
-def test_the_texture_is_the_expressions_where_it_is_seen(found: ExpressionLook) -> None:
+def test_the_texture_is_the_expressions_where_it_is_seen(found: TextureLayer) -> None:
     texture = found.over(resting(), SURFACE)
-    sure = found.share > 0.99
+    sure = found.opacity > 0.99
     assert sure[110:150, 236:276].all(), "the patch is in the middle of the face"
     assert off(wrinkled(), resting())[110:150, 236:276].mean() > 20
     assert np.median(off(texture, wrinkled())[sure]) <= 2
@@ -83,19 +83,19 @@ def test_the_texture_is_the_expressions_where_it_is_seen(found: ExpressionLook) 
     assert sure.mean() > 0.15
 
 
-def test_what_no_photo_shows_is_neutrals(found: ExpressionLook) -> None:
+def test_what_no_photo_shows_is_neutrals(found: TextureLayer) -> None:
     texture = found.over(resting(), SURFACE)
     away = FRONT.center - SURFACE.points
     back = (SURFACE.normals * away).sum(axis=2) < 0
     assert back.mean() > 0.4
-    assert not found.share[back].any()
-    assert not found.seen[back].any()
+    assert not found.opacity[back].any()
+    assert not found.confidence[back].any()
     np.testing.assert_array_equal(texture[back], resting()[back])
 
 
-def test_the_two_textures_meet_in_a_ramp(found: ExpressionLook) -> None:
+def test_the_two_textures_meet_in_a_ramp(found: TextureLayer) -> None:
     """Along the equator, from the side into the face: nothing jumps."""
-    row = found.share[SIZE[1] // 2, : SIZE[0] // 2]
+    row = found.opacity[SIZE[1] // 2, : SIZE[0] // 2]
     first, last = np.flatnonzero(row > 0)[0], np.flatnonzero(row < 1)[-1]
     assert (np.diff(row[first : last + 1]) >= 0).all()
     across = np.linalg.norm(np.diff(SURFACE.points[SIZE[1] // 2, first : last + 2], axis=0), axis=1)
@@ -106,20 +106,20 @@ def test_the_two_textures_meet_in_a_ramp(found: ExpressionLook) -> None:
 def test_where_nothing_may_differ_the_texture_is_neutrals() -> None:
     within = np.clip(0.5 + MESH.vertices[:, 1] / 20, 0, 1)
     part = look([photo(wrinkled())], within=within)
-    mask = over_vertices(SURFACE, MESH, within[:, None])[..., 0]
+    mask = interpolate_vertex_values(SURFACE, MESH, within[:, None])[..., 0]
     texture = part.over(resting(), SURFACE)
     np.testing.assert_array_equal(texture[mask == 0], resting()[mask == 0])
-    assert (part.share <= mask + 1e-6).all()
+    assert (part.opacity <= mask + 1e-6).all()
     whole = look([photo(wrinkled())])
-    np.testing.assert_allclose(part.share, whole.share * mask, atol=1e-6)
+    np.testing.assert_allclose(part.opacity, whole.opacity * mask, atol=1e-6)
 
 
-def test_what_is_behind_the_lips_is_seen_through_slits(found: ExpressionLook) -> None:
+def test_what_is_behind_the_lips_is_seen_through_slits(found: TextureLayer) -> None:
     """A wide ramp would leave nothing of it."""
     slit = look([photo(wrinkled())], inside=EVERYWHERE)
-    assert (slit.share > 0.99).sum() > 1.2 * (found.share > 0.99).sum()
-    assert (slit.share >= found.share - 1e-6).all()
-    sure = slit.share > 0.99
+    assert (slit.opacity > 0.99).sum() > 1.2 * (found.opacity > 0.99).sum()
+    assert (slit.opacity >= found.opacity - 1e-6).all()
+    sure = slit.opacity > 0.99
     assert np.median(off(slit.over(resting(), SURFACE), wrinkled())[sure]) <= 2
 
 
@@ -127,7 +127,7 @@ def test_what_is_behind_the_lips_is_seen_through_slits(found: ExpressionLook) ->
 def test_exposure_and_white_balance_are_neutrals(exposure: tuple[float, ...]) -> None:
     found = look([photo(wrinkled(), exposure=np.array(exposure))])
     np.testing.assert_allclose(found.gains, [1 / np.array(exposure)], rtol=0.02)
-    sure = found.share > 0.99
+    sure = found.opacity > 0.99
     texture = found.over(resting(), SURFACE)
     assert np.median(off(texture, wrinkled())[sure]) <= 2
 
@@ -153,7 +153,7 @@ def test_photos_of_unlike_exposure_agree() -> None:
     ]
     found = look(photos, cameras)
     np.testing.assert_allclose(found.gains, [[1 / gain] * 3 for gain in exposures], rtol=0.02)
-    sure = found.share > 0.99
+    sure = found.opacity > 0.99
     texture = found.over(resting(), SURFACE)
     assert np.median(off(texture, wrinkled())[sure]) <= 2
     assert np.percentile(off(texture, wrinkled())[sure], 99) <= 8, "no seam between them"
@@ -181,9 +181,9 @@ def test_eyes_are_seen_for_themselves() -> None:
     np.testing.assert_allclose(found.gains, 1, atol=0.01, err_msg="skin alone tells exposure")
 
 
-def made_up(tone: int, share: Array) -> ExpressionLook:
+def made_up(tone: int, share: Array) -> TextureLayer:
     colours = np.full((*share.shape, 3), tone, np.float32)
-    return ExpressionLook(colours, share, (share > 0).astype(np.float32), np.ones((1, 3)))
+    return TextureLayer(colours, share, (share > 0).astype(np.float32), np.ones((1, 3)))
 
 
 def test_colours_count_by_their_share(rng: np.random.Generator) -> None:
@@ -201,8 +201,8 @@ def test_looks_beside_each_other_are_both() -> None:
     shape = SIZE[1], SIZE[0]
     left, right = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     left[:, :300], right[:, 200:] = 1, 1
-    both = made_up(50, left).beside(made_up(150, right))
-    np.testing.assert_allclose(both.share, 1)
+    both = made_up(50, left).merged_with(made_up(150, right))
+    np.testing.assert_allclose(both.opacity, 1)
     np.testing.assert_allclose(both.colours[:, :200], 50)
     np.testing.assert_allclose(both.colours[:, 200:300], 100)
     np.testing.assert_allclose(both.colours[:, 300:], 150)

@@ -10,9 +10,9 @@ from mien.errors import InputError
 from mien.texture.atlas import atlas_surface
 from mien.texture.blend import Blend
 from mien.texture.cylinder import cylinder_surface, fit_cylinder
-from mien.texture.fill import fill_image, fill_part, make_backdrop, mix, over
+from mien.texture.fill import alpha_composite, blend_over, build_skin_fill, fill_image, fill_part
 from mien.texture.parts import REGION_COLOURS
-from mien.texture.surface import parts_of
+from mien.texture.surface import part_mask
 from shapes import ellipsoid, with_nose
 
 
@@ -24,13 +24,13 @@ def uniform(colour: tuple[int, int, int], confidence: Array) -> Blend:
 def test_one_blend_over_another() -> None:
     upper = uniform((200, 0, 0), np.array([[1.0, 0.5, 0.0, 0.0]]))
     lower = uniform((0, 100, 0), np.array([[1.0, 1.0, 0.5, 0.0]]))
-    both = over(upper, lower)
+    both = blend_over(upper, lower)
     np.testing.assert_allclose(both.confidence, [[1, 1, 0.5, 0]])
     np.testing.assert_allclose(both.colours[0, :3], [[200, 0, 0], [100, 50, 0], [0, 100, 0]])
 
 
 def test_mixing_is_linear_in_the_confidence() -> None:
-    mixed = mix(np.full((1, 3, 3), 100.0), np.zeros(3), np.array([[0, 0.25, 1]]))
+    mixed = alpha_composite(np.full((1, 3, 3), 100.0), np.zeros(3), np.array([[0, 0.25, 1]]))
     np.testing.assert_allclose(mixed[0, :, 0], [0, 25, 100])
 
 
@@ -62,11 +62,11 @@ def test_regions_do_not_run_into_each_other() -> None:
     blend = uniform((180, 130, 110), coarse.points[..., 2] > 0)
     blend.colours[coarse.points[..., 1] > 35] = (30, 25, 20)
     regions = {"scalp": hair, "neck": 1 - hair, "mouth_cavity": mouth}
-    backdrop = make_backdrop(coarse, mesh, blend, cylinder, "pyramid", regions)
-    np.testing.assert_allclose(backdrop.masks.sum(axis=0), 1, atol=1e-9)
+    skin_fill = build_skin_fill(coarse, mesh, blend, cylinder, "pyramid", regions)
+    np.testing.assert_allclose(skin_fill.masks.sum(axis=0), 1, atol=1e-9)
     surface = atlas_surface(mesh, width=100, height=80)
     colours = np.zeros((80, 100, 3), np.float32)
-    colours[surface.mask] = backdrop.colours(surface, mesh, surface.mask)
+    colours[surface.mask] = skin_fill.colours(surface, mesh, surface.mask)
     y, back = surface.points[..., 1], surface.points[..., 2] < -10
     np.testing.assert_allclose(colours[back & (y > 45)], [[30, 25, 20]] * (back & (y > 45)).sum())
     skin = back & (y < 25)
@@ -81,7 +81,7 @@ def test_a_mask_of_another_mesh_is_refused() -> None:
     coarse = cylinder_surface(mesh, cylinder, width=64, height=32)
     blend = uniform((1, 2, 3), coarse.mask)
     with pytest.raises(InputError, match=r"scalp: expected shape \(3321\), got shape \(5,\)"):
-        make_backdrop(coarse, mesh, blend, cylinder, "pyramid", {"scalp": np.zeros(5)})
+        build_skin_fill(coarse, mesh, blend, cylinder, "pyramid", {"scalp": np.zeros(5)})
 
 
 def test_the_hair_cap_takes_the_colours_of_the_scalp() -> None:
@@ -92,8 +92,8 @@ def test_the_hair_cap_takes_the_colours_of_the_scalp() -> None:
     scalp = np.clip((mesh.vertices[:, 1] - 30) / 10, 0, 1)
     blend = uniform((180, 130, 110), coarse.mask)
     blend.colours[coarse.points[..., 1] > 35] = (30, 25, 20)
-    backdrop = make_backdrop(coarse, hairy, blend, cylinder, "pyramid", {"scalp": scalp})
+    skin_fill = build_skin_fill(coarse, hairy, blend, cylinder, "pyramid", {"scalp": scalp})
     surface = atlas_surface(hairy, width=200, height=80)
-    hair = parts_of(surface, hairy, "hair")
-    colours = backdrop.colours(surface, hairy, hair)
+    hair = part_mask(surface, hairy, "hair")
+    colours = skin_fill.colours(surface, hairy, hair)
     np.testing.assert_allclose(colours, [[30, 25, 20]] * hair.sum(), atol=1e-3)

@@ -8,7 +8,7 @@ import pytest
 from mien.errors import InputError
 from mien.texture.atlas import atlas_surface
 from mien.texture.cylinder import cylinder_surface, fit_cylinder
-from mien.texture.visibility import feather, prepare_view, sight
+from mien.texture.visibility import feather, prepare_view, surface_visibility
 from shapes import camera_at, ellipsoid, with_nose
 
 GREY = np.full((320, 320, 3), 128, np.uint8)
@@ -18,9 +18,9 @@ def test_what_the_nose_hides_is_invisible() -> None:
     mesh = with_nose(ellipsoid())
     camera = camera_at(40, mesh)
     surface = atlas_surface(mesh, width=400, height=200)
-    seen = sight(surface, prepare_view(mesh, camera, GREY), feather_mm=0.1)
+    seen = surface_visibility(surface, prepare_view(mesh, camera, GREY), feather_mm=0.1)
     bare = mesh.submesh(mesh.triangles_of("skin"))
-    alone = sight(surface, prepare_view(bare, camera, GREY), feather_mm=0.1)
+    alone = surface_visibility(surface, prepare_view(bare, camera, GREY), feather_mm=0.1)
     # Texels whose ray to the camera goes through the ball, at least 8 mm deep.
     to = surface.points - [0, 0, 105]
     direction = camera.center - surface.points
@@ -39,7 +39,7 @@ def test_certainty_is_the_cosine_towards_the_camera() -> None:
     mesh = ellipsoid()
     camera = camera_at(0, mesh)
     surface = atlas_surface(mesh, width=100, height=80)
-    seen = sight(surface, prepare_view(mesh, camera, GREY))
+    seen = surface_visibility(surface, prepare_view(mesh, camera, GREY))
     to_camera = camera.center - surface.points
     to_camera /= np.linalg.norm(to_camera, axis=2, keepdims=True)
     expected = np.einsum("hwc,hwc->hw", surface.normals, to_camera).clip(0)
@@ -53,7 +53,7 @@ def test_what_is_turned_away_further_than_asked_for_is_invisible(least: float) -
     mesh = ellipsoid()
     surface = atlas_surface(mesh, width=100, height=80)
     view = prepare_view(mesh, camera_at(0, mesh), GREY)
-    seen = sight(surface, view, feather_mm=0, least_certainty=least)
+    seen = surface_visibility(surface, view, feather_mm=0, min_certainty=least)
     assert not seen.feathered[seen.certainty < least].any()
     # Steeper, neighbouring pixels lie too far apart to be one layer's.
     facing = seen.certainty > max(least, 0.4)
@@ -66,7 +66,7 @@ def test_points_outside_the_photo_are_invisible_and_its_border_is_feathered() ->
     # The right half of the photo is cut away: it shows x < 0 only.
     half = replace(camera, width=160)
     surface = cylinder_surface(mesh, fit_cylinder(mesh), width=256, height=128)
-    seen = sight(surface, prepare_view(mesh, half, GREY[:, :160]), feather_mm=10)
+    seen = surface_visibility(surface, prepare_view(mesh, half, GREY[:, :160]), feather_mm=10)
     front = surface.points[64, 128 - 40 : 128 + 40, 0], seen.feathered[64, 128 - 40 : 128 + 40]
     x, weight = front
     assert not weight[x > 1].any()
@@ -129,4 +129,4 @@ def test_bad_input_is_refused() -> None:
     view = prepare_view(mesh, camera_at(0, mesh), GREY)
     surface = atlas_surface(mesh, width=50, height=50)
     with pytest.raises(InputError, match="tolerance_mm: expected a number above zero"):
-        sight(surface, view, tolerance_mm=0)
+        surface_visibility(surface, view, tolerance_mm=0)

@@ -56,9 +56,9 @@ def head_rotation(yaw: float, pitch: float, roll: float) -> Float[Array, "3 3"]:
     """Rotation of head space as `mien render` composes it: yaw first, then pitch, then roll.
 
     Args:
-        yaw: radians; to the subject's left, down, to the subject's right shoulder.
-        pitch: radians; to the subject's left, down, to the subject's right shoulder.
-        roll: radians; to the subject's left, down, to the subject's right shoulder.
+        yaw: radians, positive to the subject's left.
+        pitch: radians, positive down.
+        roll: radians, positive to the subject's right shoulder.
     """
     from scipy.spatial.transform import Rotation
 
@@ -66,8 +66,10 @@ def head_rotation(yaw: float, pitch: float, roll: float) -> Float[Array, "3 3"]:
     return Rotation.from_euler("yxz", [yaw, pitch, roll]).as_matrix()
 
 
-def head_angles(rotation: Float[Array, "3 3"], *, order: str = "yxz") -> tuple[float, float, float]:
-    """The yaw, pitch and roll that make this rotation; pitch (in `order`'s middle) within pi / 2.
+def head_angles_rad(
+    rotation: Float[Array, "3 3"], *, order: str = "yxz"
+) -> tuple[float, float, float]:
+    """Yaw, pitch and roll of a rotation, radians; pitch (in `order`'s middle) within pi / 2.
 
     Args:
         rotation: of head space.

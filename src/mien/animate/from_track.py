@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mien.animate.channels import HEAD, MEMBERS, head_angles
+from mien.animate.channels import HEAD, MEMBERS, head_angles_rad
 from mien.animate.curves import MIN_STEP, sampled
 from mien.animate.timeline import PIVOT_MM, Moment, Timeline
 from mien.arrays import Array, Float
@@ -95,7 +95,7 @@ def _head_values(camera: Camera, states: list[TrackState]) -> dict[str, Float[Ar
     back = camera.R_cam_head.T
     rotations = np.array([back @ state.R_cam_head for state in states])
     moved = np.array([back @ (state.t_cam_head - camera.t_cam_head) for state in states])
-    angles = np.unwrap([head_angles(rotation) for rotation in rotations], axis=0)
+    angles = np.unwrap([head_angles_rad(rotation) for rotation in rotations], axis=0)
     pivot = np.array(PIVOT_MM)
     shifts = moved - (pivot - rotations @ pivot)
     names = (f"{HEAD}.{name}" for name in MEMBERS[HEAD])

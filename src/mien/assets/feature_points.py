@@ -1,4 +1,4 @@
-"""The feature points that expressions are synthesised from: names, sets, triangles."""
+"""The feature points of expression synthesis: names, sets, triangles."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from typing import Any
 import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array, frozen
-from mien.assets.data_file import need, read_data, shares
+from mien.assets.data_file import affine_weights, read_data, typed_entry
+from mien.assets.landmark_sets import LANDMARK_COUNT
 from mien.errors import DocumentError, InputError
 from mien.numeric.planar_similarity import estimate_planar_similarity
 
 __all__ = ["FeatureLayout", "load_feature_layout"]
 
-LANDMARK_COUNT = 478
-FORMAT = "mien feature points"
+_FORMAT = "mien feature points"
 
 
 @dataclass(frozen=True)
 class FeatureLayout:
-    """What feature points there are on a face and what is drawn on them.
+    """The feature points of a face, with their sets and the triangles over them.
 
     Attributes:
         name: "zhang134".
@@ -36,9 +36,10 @@ class FeatureLayout:
             subject's left.
         triangles: (T, 3) over the points and, after them, those of `frame`; none is folded over on
             the template.
-        mixes: (n, 478) each point from the detector's landmarks; rows sum to 1.
+        landmark_weights: (n, 478) each point as an affine combination of the detector's landmarks;
+            rows sum to 1.
         rigid: points that move with the head alone ([Zhang 2006] section 12.1).
-        surround: (k, 2) the points of `frame` on the template.
+        template_frame: (k, 2) the points of `frame` on the template.
 
     Source:
         [Zhang 2006] section 5.1, Fig. 2a.
@@ -51,9 +52,9 @@ class FeatureLayout:
     mirror: Int[Array, " n"]
     template: Float[Array, "n 2"]
     triangles: Int[Array, "t 3"]
-    mixes: Float[Array, "n 478"]
+    landmark_weights: Float[Array, "n 478"]
     rigid: Int[Array, " r"]
-    surround: Float[Array, "k 2"]
+    template_frame: Float[Array, "k 2"]
 
     @cached_property
     def _indices(self) -> dict[str, int]:
@@ -61,7 +62,7 @@ class FeatureLayout:
 
     @cached_property
     def face_triangles(self) -> Int[Array, "t 3"]:
-        """(T, 3) those of the triangles that need no point of `frame`."""
+        """(T, 3) those of the triangles that typed_entry no point of `frame`."""
         return frozen(self.triangles[(self.triangles < len(self.names)).all(axis=1)])
 
     def index(self, name: str) -> int:
@@ -84,7 +85,7 @@ class FeatureLayout:
         Raises:
             InputError: shape, NaN.
         """
-        return self.mixes @ check_array("landmarks", landmarks, (LANDMARK_COUNT, 2))
+        return self.landmark_weights @ check_array("landmarks", landmarks, (LANDMARK_COUNT, 2))
 
     def frame(self, points: Float[Array, "n 2"]) -> Float[Array, "k 2"]:
         """Points around the face that follow the head and no expression, in the same pixels.
@@ -98,7 +99,7 @@ class FeatureLayout:
         """
         points = check_array("points", points, (len(self.names), 2))
         motion = estimate_planar_similarity(self.template[self.rigid], points[self.rigid])
-        return motion(self.surround)
+        return motion(self.template_frame)
 
 
 def load_feature_layout(path: str | Path | None = None) -> FeatureLayout:
@@ -109,28 +110,30 @@ def load_feature_layout(path: str | Path | None = None) -> FeatureLayout:
         FileFormatError: it holds no layout; says where.
     """
     shipped = str(files("mien.assets") / "data" / "zhang134.json")
-    return read_data(Path(path or shipped), FORMAT, _layout)
+    return read_data(Path(path or shipped), _FORMAT, _layout)
 
 
 def _layout(document: dict[str, Any]) -> FeatureLayout:
-    points = need(document, "points", list)
-    names = tuple(need(p, "name", str, f"points[{i}]") for i, p in enumerate(points))
+    points = typed_entry(document, "points", list)
+    names = tuple(typed_entry(p, "name", str, f"points[{i}]") for i, p in enumerate(points))
     for name in names:
         if names.count(name) > 1:
             raise DocumentError("points", f"{name!r} appears twice")
-    surround = _places(need(document, "frame", list), "frame")
-    sets = _sets(need(document, "sets", list), names)
+    frame = _points_2d(typed_entry(document, "frame", list), "frame")
+    sets = _sets(typed_entry(document, "sets", list), names)
     return FeatureLayout(
-        name=need(document, "name", str),
+        name=typed_entry(document, "name", str),
         names=names,
         sets=tuple(tuple(level.values()) for level in sets),
         set_names=tuple(tuple(level) for level in sets),
         mirror=_mirror(points, names),
-        template=_places([need(p, "template", list, p["name"]) for p in points], "template"),
-        triangles=_triangles(need(document, "triangles", list), len(names) + len(surround)),
-        mixes=_mixes(points),
-        rigid=_rigid(need(document, "rigid", list), names),
-        surround=surround,
+        template=_points_2d(
+            [typed_entry(p, "template", list, p["name"]) for p in points], "template"
+        ),
+        triangles=_triangles(typed_entry(document, "triangles", list), len(names) + len(frame)),
+        landmark_weights=_landmark_weights(points),
+        rigid=_rigid(typed_entry(document, "rigid", list), names),
+        template_frame=frame,
     )
 
 
@@ -145,7 +148,7 @@ def _indices(members: Any, names: tuple[str, ...], place: str) -> Int[Array, " s
 
 
 def _sets(levels: list[Any], names: tuple[str, ...]) -> list[dict[str, Int[Array, " s"]]]:
-    """Levels of sets that hold every point and hang together, so that all is reached from any."""
+    """Levels of sets that hold every point; each set shares a point with the level above."""
     found = []
     for number, level in enumerate(levels):
         if not isinstance(level, dict):
@@ -171,7 +174,7 @@ def _rigid(members: list[Any], names: tuple[str, ...]) -> Int[Array, " r"]:
     return indices
 
 
-def _places(rows: list[Any], place: str) -> Float[Array, "n 2"]:
+def _points_2d(rows: list[Any], place: str) -> Float[Array, "n 2"]:
     try:
         return frozen(check_array(place, rows, (None, 2)))
     except InputError as error:
@@ -179,7 +182,7 @@ def _places(rows: list[Any], place: str) -> Float[Array, "n 2"]:
 
 
 def _mirror(points: list[Any], names: tuple[str, ...]) -> Int[Array, " n"]:
-    partners = [need(p, "mirror", str, p["name"]) for p in points]
+    partners = [typed_entry(p, "mirror", str, p["name"]) for p in points]
     mirror = _indices(partners, names, "mirror")
     for index, name in enumerate(names):
         if mirror[mirror[index]] != index:
@@ -199,13 +202,15 @@ def _is_triple(row: Any) -> bool:
     return isinstance(row, list) and len(row) == 3 and all(type(entry) is int for entry in row)
 
 
-def _mixes(points: list[Any]) -> Float[Array, "n 478"]:
-    mixes = np.zeros((len(points), LANDMARK_COUNT))
-    for row, point in zip(mixes, points, strict=True):
+def _landmark_weights(points: list[Any]) -> Float[Array, "n 478"]:
+    weights = np.zeros((len(points), LANDMARK_COUNT))
+    for row, point in zip(weights, points, strict=True):
         place = f"{point['name']}.landmarks"
-        found = shares(need(point, "landmarks", dict, point["name"]), _landmark, place)
+        found = affine_weights(
+            typed_entry(point, "landmarks", dict, point["name"]), _landmark, place
+        )
         row[list(found)] = list(found.values())
-    return frozen(mixes)
+    return frozen(weights)
 
 
 def _landmark(number: str) -> int | None:

@@ -1,6 +1,8 @@
-"""Groups of the detector's 478 landmarks, by their numbers, as its authors group them."""
+"""The detector's landmarks: how many, and groups of them as its authors group them."""
 
 from __future__ import annotations
+
+LANDMARK_COUNT = 478
 
 # fmt: off
 EYES = frozenset({

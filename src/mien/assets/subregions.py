@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int, check_array, frozen
-from mien.assets.data_file import need, read_data, shares
+from mien.assets.data_file import affine_weights, read_data, typed_entry
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import DocumentError, InputError
 from mien.reading.strict_json import as_number
 
 __all__ = ["SubregionDrawing", "Subregions", "default_subregions", "load_subregion_drawing"]
 
-FORMAT = "mien subregions"
+_FORMAT = "mien subregions"
 _TEMPLATE_WIDTH_PX = 300
-_MOST_FADED = 1.001
+_MAX_SUM = 1.001
 """Of all subregions together at a pixel: 1, but for rounding."""
 
 
@@ -31,16 +31,16 @@ class SubregionDrawing:
         names: of the subregions.
         groups: within a group, neighbours blend; between groups borders are hard. The first one's
             group fades out around the face.
-        corners: of each polygon, (c, n + k): mixes of the layout's points and its frame's.
+        corners: of each polygon, (c, n + k): weights of the layout's points and its frame's.
         blends: width of the blend along each one's borders, in widths of the face; one a group.
-        also: of each, points that tell about it, wherever they lie.
+        extra_points: of each, indices of points that belong to it wherever they lie.
     """
 
     names: tuple[str, ...]
     groups: tuple[str, ...]
     corners: tuple[Float[Array, "c points"], ...]
     blends: tuple[float, ...]
-    also: tuple[Int[Array, " a"], ...]
+    extra_points: tuple[Int[Array, " a"], ...]
 
 
 @dataclass(frozen=True)
@@ -49,14 +49,14 @@ class Subregions:
 
     Attributes:
         names: R of them, teeth last.
-        fades: (h, w, R) float32, each pixel's shares; they sum to 1 inside of the face and fall to
-            0 around it.
+        fades: (h, w, R) float32, each pixel's blend weights; they sum to 1 inside of the face and
+            fall to 0 around it.
         members: of each, the indices of the feature points within it or on its boundary, and of
-            others that tell about it: lids follow the pupil.
+            others that belong to it: lids follow the pupil.
 
     Raises:
         InputError: two of one name, fades for another number of them, below 0 or together above 1,
-            one without a point that tells about it.
+            one without a point.
     """
 
     names: tuple[str, ...]
@@ -70,7 +70,7 @@ class Subregions:
             raise InputError("subregions", "names of their own", ", ".join(self.names))
         fades = check_array("fades", self.fades, (None, None, count), dtype=np.float32)
         object.__setattr__(self, "fades", fades)
-        if not (fades.min(initial=0) >= 0 and fades.sum(axis=2).max(initial=0) <= _MOST_FADED):
+        if not (fades.min(initial=0) >= 0 and fades.sum(axis=2).max(initial=0) <= _MAX_SUM):
             found = f"{fades.min():g} and a sum of {fades.sum(axis=2).max():g}"
             raise InputError("fades", "shares from 0 on that sum to 1 at most", found)
         if len(self.members) != count:
@@ -116,7 +116,7 @@ def default_subregions(
 def _fades(
     layout: FeatureLayout, drawing: SubregionDrawing, points: Array, size: tuple[int, int]
 ) -> Float[Array, "h w r"]:
-    """Shares by eq. (7): linear across a border, half on it; none across hard borders."""
+    """Blend weights by eq. (7): linear across a border, half on it; none across hard borders."""
     labels = _painted(layout, drawing, points, size)
     widths = np.array(drawing.blends) * float(np.ptp(points[:, 0]))
     groups = np.array([sorted(set(drawing.groups)).index(group) for group in drawing.groups])
@@ -124,8 +124,8 @@ def _fades(
     # Off the face, every pixel goes on with the group of the skin.
     group_of = np.where(labels >= 0, groups[labels], groups[0])
     for region, group in enumerate(groups):
-        inside, kin = labels == region, np.isin(labels, np.flatnonzero(groups == group))
-        depth = _distance_to(kin & ~inside) - _distance_to(inside)
+        inside, same_group = labels == region, np.isin(labels, np.flatnonzero(groups == group))
+        depth = _distance_to(same_group & ~inside) - _distance_to(inside)
         depth -= 0.5 * np.sign(depth)  # Borders run between the centres of pixels.
         fades[..., region] = np.clip(0.5 + depth / widths[region], 0, 1) * (group_of == group)
     fades /= fades.sum(axis=2, keepdims=True)
@@ -152,7 +152,7 @@ def _painted(
 
 
 def _distance_to(mask: Bool[Array, "h w"]) -> Float[Array, "h w"]:
-    """From each pixel to the nearest one in the mask, in px; far off where there is none."""
+    """From each pixel to the nearest one in the mask, px; 1e6 where there is none."""
     import cv2
 
     if not mask.any():
@@ -161,17 +161,14 @@ def _distance_to(mask: Bool[Array, "h w"]) -> Float[Array, "h w"]:
 
 
 def _members(layout: FeatureLayout, drawing: SubregionDrawing) -> tuple[Int[Array, " m"], ...]:
-    """Points within a subregion or where it blends, found on the template: the same for all.
-
-    And those that are named for it.
-    """
-    low = np.minimum(layout.template.min(axis=0), layout.surround.min(axis=0))
+    """Points within a subregion or its blend on the template, and those named for it."""
+    low = np.minimum(layout.template.min(axis=0), layout.template_frame.min(axis=0))
     points = (layout.template - low) * _TEMPLATE_WIDTH_PX
-    size = np.ceil((layout.surround.max(axis=0) - low) * _TEMPLATE_WIDTH_PX).astype(int) + 1
+    size = np.ceil((layout.template_frame.max(axis=0) - low) * _TEMPLATE_WIDTH_PX).astype(int) + 1
     labels = _painted(layout, drawing, points, (int(size[0]), int(size[1])))
     columns, rows = np.floor(points).astype(int).T
     members = []
-    for region, (blend, also) in enumerate(zip(drawing.blends, drawing.also, strict=True)):
+    for region, (blend, also) in enumerate(zip(drawing.blends, drawing.extra_points, strict=True)):
         distances = _distance_to(labels == region)[rows, columns]
         within = np.flatnonzero(distances <= blend / 2 * _TEMPLATE_WIDTH_PX)
         members.append(frozen(np.union1d(within, also)))
@@ -188,7 +185,7 @@ def load_subregion_drawing(
         FileFormatError: no subregions over this layout.
     """
     shipped = str(files("mien.assets") / "data" / "zhang134_subregions.json")
-    return read_data(Path(path or shipped), FORMAT, lambda document: _drawing(document, layout))
+    return read_data(Path(path or shipped), _FORMAT, lambda document: _drawing(document, layout))
 
 
 @dataclass(frozen=True)
@@ -199,13 +196,13 @@ class _Region:
 
 
 def _drawing(document: dict[str, Any], layout: FeatureLayout) -> SubregionDrawing:
-    if need(document, "layout", str) != layout.name:
+    if typed_entry(document, "layout", str) != layout.name:
         problem = f"expected {layout.name!r}, found {document['layout'][:40]!r}"
         raise DocumentError("layout", problem)
-    blends = {k: _width(v, f"groups.{k}") for k, v in need(document, "groups", dict).items()}
+    blends = {k: _width(v, f"groups.{k}") for k, v in typed_entry(document, "groups", dict).items()}
     regions: dict[str, _Region] = {}
-    for number, entry in enumerate(need(document, "regions", list)):
-        name = need(entry, "name", str, f"regions[{number}]")
+    for number, entry in enumerate(typed_entry(document, "regions", list)):
+        name = typed_entry(entry, "name", str, f"regions[{number}]")
         if name in regions:
             raise DocumentError(f"regions[{number}]", f"{name!r} appears twice")
         regions[name] = region = _region(entry, name, regions, layout)
@@ -218,7 +215,7 @@ def _drawing(document: dict[str, Any], layout: FeatureLayout) -> SubregionDrawin
         groups=tuple(region.group for region in regions.values()),
         corners=tuple(frozen(region.corners) for region in regions.values()),
         blends=tuple(blends[region.group] for region in regions.values()),
-        also=tuple(frozen(region.also) for region in regions.values()),
+        extra_points=tuple(frozen(region.also) for region in regions.values()),
     )
 
 
@@ -228,14 +225,14 @@ def _region(
     """As drawn, or one of those before it on the other side of the face."""
     if "mirror_of" not in entry:
         also = _points(entry["also"], f"{name}.also", layout) if "also" in entry else []
-        group = need(entry, "group", str, name)
+        group = typed_entry(entry, "group", str, name)
         return _Region(group, _polygon(entry, name, layout), np.array(also, dtype=np.intp))
-    original = before.get(need(entry, "mirror_of", str, name))
+    original = before.get(typed_entry(entry, "mirror_of", str, name))
     if original is None:
         raise DocumentError(
             f"{name}.mirror_of", f"no subregion {entry['mirror_of']!r} before this one"
         )
-    group = need(entry, "group", str, name) if "group" in entry else original.group
+    group = typed_entry(entry, "group", str, name) if "group" in entry else original.group
     return _Region(group, _mirrored(original.corners, layout), layout.mirror[original.also])
 
 
@@ -256,15 +253,15 @@ def _width(value: Any, place: str) -> float:
 
 
 def _polygon(region: Any, name: str, layout: FeatureLayout) -> Float[Array, "c points"]:
-    frame = [f"frame.{i}" for i in range(len(layout.surround))]
+    frame = [f"frame.{i}" for i in range(len(layout.template_frame))]
     index = {point: i for i, point in enumerate((*layout.names, *frame))}
-    corners = need(region, "corners", list, name)
+    corners = typed_entry(region, "corners", list, name)
     polygon = np.zeros((len(corners), len(index)))
     for number, (row, corner) in enumerate(zip(polygon, corners, strict=True)):
         place = f"{name}.corners[{number}]"
         if not isinstance(corner, dict):
             raise DocumentError(place, "expected an object of shares by point")
-        found = shares(corner, index.get, place)
+        found = affine_weights(corner, index.get, place)
         row[list(found)] = list(found.values())
     if region.get("symmetric"):
         polygon = np.vstack([polygon, _mirrored(polygon, layout)[::-1]])
@@ -275,6 +272,6 @@ def _polygon(region: Any, name: str, layout: FeatureLayout) -> Float[Array, "c p
 
 def _mirrored(polygon: Array, layout: FeatureLayout) -> Float[Array, "c points"]:
     """The polygon on the other side of the face; the frame's first point is at its top."""
-    around = len(layout.surround)
+    around = len(layout.template_frame)
     mirror = np.append(layout.mirror, len(layout.names) + (-np.arange(around)) % around)
     return polygon[:, mirror]

@@ -16,7 +16,7 @@ from mien.arrays import Array, Float, frozen
 from mien.capture.images.photos import Photo
 from mien.errors import FileFormatError, InputError
 from mien.limits import LARGEST
-from mien.reading.strict_json import join, kind_of, read_json
+from mien.reading.strict_json import join, json_type, read_json
 
 if TYPE_CHECKING:
     from mien.assets.generic import GenericHead
@@ -156,7 +156,7 @@ def _section(
 ) -> dict[str, Any]:
     section = data.get(key, {})
     if not isinstance(section, dict):
-        raise FileFormatError(path, f"expected an object, found {kind_of(section)}", key)
+        raise FileFormatError(path, f"expected an object, found {json_type(section)}", key)
     for name in section:
         if name not in known:
             raise FileFormatError(path, f"unknown name{_nearest(name, known)}", join(key, name))
@@ -165,7 +165,7 @@ def _section(
 
 def _curve(path: Path, place: str, value: Any, size: Array) -> Float[Array, "m 2"]:
     if not isinstance(value, list) or len(value) < 2:
-        found = len(value) if isinstance(value, list) else kind_of(value)
+        found = len(value) if isinstance(value, list) else json_type(value)
         raise FileFormatError(path, f"expected two points or more, found {found}", place)
     points = _points(path, place, value, size)
     if (points == points[0]).all():

@@ -12,9 +12,9 @@ from mien.capture.output_folders import made_by_mien
 from mien.capture.source_kind import VIDEO_SUFFIXES, kind_of_source
 from mien.errors import InputError, escaped
 from mien.expression_names import check_expression_folders
-from mien.reading.names import listed, plain_name
+from mien.head import NEUTRAL
+from mien.reading.names import list_folder, portable_name
 
-NEUTRAL = "neutral"
 ANNOTATIONS = "annotations"
 _DOCUMENTS = frozenset({"COPYING", "CREDITS", "LICENCE", "LICENSE", "NOTICE", "README"})
 """Files that often lie beside photos and that nobody takes for one."""
@@ -42,7 +42,7 @@ def photo_files(source: Path) -> dict[str, list[Path]]:
 
 def _expression(folder: Path) -> str:
     """A folder's name; `Neutral` is `neutral`, as other stages look for that."""
-    return NEUTRAL if folder.name.lower() == NEUTRAL else plain_name(folder)
+    return NEUTRAL if folder.name.lower() == NEUTRAL else portable_name(folder)
 
 
 def ignored_files(source: Path) -> list[str]:
@@ -68,10 +68,10 @@ def orphaned_annotations(photos: Sequence[Path]) -> list[str]:
     folder = photos[0].parent / ANNOTATIONS
     if not folder.is_dir():
         return []
-    stems = {path.stem for path in listed(photos[0].parent)}
+    stems = {path.stem for path in list_folder(photos[0].parent)}
     return [
         f"{ANNOTATIONS}/{escaped(path.name)}: there is no photo of that name"
-        for path in listed(folder)
+        for path in list_folder(folder)
         if path.suffix == ".json" and path.stem not in stems
     ]
 
@@ -113,7 +113,7 @@ def _photos_in(folder: Path) -> list[Path]:
 
 def _files_in(folder: Path) -> list[Path]:
     """Pipes and devices, too, so that one with a photo's name is refused by it."""
-    return [path for path in listed(folder) if not path.is_dir()]
+    return [path for path in list_folder(folder) if not path.is_dir()]
 
 
 def _subfolders(folder: Path) -> list[Path]:
@@ -123,7 +123,7 @@ def _subfolders(folder: Path) -> list[Path]:
 
 
 def _folders_in(folder: Path) -> list[Path]:
-    return [path for path in listed(folder) if path.is_dir()]
+    return [path for path in list_folder(folder) if path.is_dir()]
 
 
 def _is_stray(path: Path) -> bool:

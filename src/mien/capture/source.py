@@ -10,7 +10,7 @@ import numpy as np
 
 from mien.capture.annotations import AnnotationNames, Annotations, load_annotations
 from mien.capture.duplicates import same_photo
-from mien.capture.faces.detector import NO_FACE, LandmarkDetector, NoFaceError
+from mien.capture.faces.detector import NO_FACE_FOUND, LandmarkDetector, NoFaceError
 from mien.capture.faces.landmarks import Landmarks
 from mien.capture.faces.mediapipe_face import yaw_pitch
 from mien.capture.folder import (
@@ -25,7 +25,7 @@ from mien.capture.source_kind import kind_of_source
 from mien.capture.video.picked_frames import pick_frames
 from mien.errors import EstimationError
 from mien.progress import StepProgress
-from mien.reading.names import plain_name
+from mien.reading.names import portable_name
 
 TO_BE_PLACED = "no face found; the other photos tell where it was taken from, if they can"
 """Noted of a photo that shows a profile, perhaps, or nobody."""
@@ -119,7 +119,7 @@ def load_capture(
             f"{source}: no photo shows a face that can be used ({'; '.join(reasons[:3])})"
         )
     notes = (*reader.notes, *gathered_notes(reader.told), *_viewpoint_notes(found))
-    name = plain_name(source.with_suffix("") if source.is_file() else source.resolve())
+    name = portable_name(source.with_suffix("") if source.is_file() else source.resolve())
     return Capture(name, found, notes)
 
 
@@ -169,7 +169,7 @@ class _Reader:
             max_side=self.max_side,
             progress=self.progress,
         )
-        self.notes += [f"{plain_name(source)}: {note}" for note in picked.notes]
+        self.notes += [f"{portable_name(source)}: {note}" for note in picked.notes]
         found = {}
         for name, photos in picked.expressions.items():
             views: list[CapturedView] = []
@@ -208,7 +208,7 @@ class _Reader:
     def _settled(self, views: list[CapturedView]) -> tuple[CapturedView, ...]:
         """Photos without a face stay if any other photo of the expression has one."""
         anchored = any(view.marked for view in views)
-        what = TO_BE_PLACED if anchored else f"left out: {NO_FACE}"
+        what = TO_BE_PLACED if anchored else f"left out: {NO_FACE_FOUND}"
         self.told += [(view.photo.name, what) for view in views if not view.marked]
         return tuple(views) if anchored else ()
 

@@ -11,9 +11,10 @@ from mien.capture.images.unsupported import unread_kind
 from mien.capture.output_folders import made_by_mien
 from mien.capture.video.video import is_video
 from mien.errors import FileFormatError, InputError
-from mien.reading.names import check_readable, kind_of, named_path
+from mien.reading.files import check_readable, describe_content
+from mien.reading.names import check_path
 
-EXPECTED = "a photo, a video or a folder of photos"
+_EXPECTED = "a photo, a video or a folder of photos"
 _VIDEO_SUFFIXES = (
     ".3g2 .3gp .apng .asf .avi .divx .dv .f4v .flv .m1v .m2ts .m2v .m4v .mkv .mod .mov .mp4 .mpe "
     ".mpeg .mpg .mts .mxf .ogm .ogv .qt .rm .tod .ts .vob .webm .wmv"
@@ -34,13 +35,13 @@ def kind_of_source(source: str | Path) -> SourceKind:
         InputError: nothing given, nothing there, a folder that mien made, a pipe, a device.
         FileFormatError: an empty file, one that is neither a photo nor a video.
     """
-    path = named_path("source", source, EXPECTED)
+    path = check_path("source", source, _EXPECTED)
     if path.is_dir():
         if made := made_by_mien(path):
             raise InputError(source, "photos or a video", f"{made} that mien made of them")
         return "folder"
     if not path.exists():
-        raise InputError(source, EXPECTED, "nothing there")
+        raise InputError(source, _EXPECTED, "nothing there")
     check_readable(path, "a photo or a video")
     if is_image(path):
         return "photo"
@@ -49,4 +50,6 @@ def kind_of_source(source: str | Path) -> SourceKind:
         return "video"
     if suffix in PHOTO_SUFFIXES:
         return "photo"
-    raise FileFormatError(path, f"expected a photo or a video, found {unread or kind_of(path)}")
+    raise FileFormatError(
+        path, f"expected a photo or a video, found {unread or describe_content(path)}"
+    )

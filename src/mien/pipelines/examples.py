@@ -36,7 +36,7 @@ from mien.pipelines.example_annotations import (
     load_annotated_points,
 )
 from mien.progress import Progress, StepProgress, no_progress
-from mien.reading.names import plain_name
+from mien.reading.names import portable_name
 from mien.report.example_sheet import example_sheet
 from mien.synthesis.examples.brow_correction import detected_points
 from mien.synthesis.examples.example_plan import (
@@ -212,7 +212,7 @@ def _gather(
     plan = plan.with_points(
         _averaged(series, layout, photos, annotated, partial(report, DETECTING_AGAIN))
     )
-    video = plain_name(series.source) if series.is_video else ""
+    video = portable_name(series.source) if series.is_video else ""
     examples, why = build_examples(plan, photos, source=video, equalize=request.even)
     pictures = dict(zip(plan.names, plan.choice.reasons, strict=True)) | series.left_out
     notes = _notes(series, layout, plan, annotated, photos, examples)

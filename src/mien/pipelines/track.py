@@ -21,7 +21,7 @@ from mien.pipelines.tracking.outputs import OVERLAY, TrackFiles
 from mien.pipelines.tracking.ready_head import ReadyHead
 from mien.pipelines.tracking.run import TRACKING, TrackRun
 from mien.progress import Progress, no_progress
-from mien.reading.names import named_path
+from mien.reading.names import check_path
 from mien.track.lens import parse_lens
 from mien.track.smoothing import smooth
 from mien.track.state import STATUSES, Status, Track
@@ -109,7 +109,7 @@ def track_video(
         EstimationError: when all is written, a video whose frames are all lost.
     """
     tell = progress or no_progress
-    clip = Video(named_path("video", video, "a video"))
+    clip = Video(check_path("video", video, "a video"))
     files.check(clip.path)
     if smooth_seconds is not None:
         check_positive("smooth_seconds", smooth_seconds)

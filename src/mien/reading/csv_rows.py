@@ -10,7 +10,7 @@ from typing import TextIO
 
 from mien.errors import FileFormatError, InputError
 from mien.limits import LARGEST, MAX_LINE, MAX_TABLE_BYTES
-from mien.reading.files import check_file
+from mien.reading.files import check_size
 
 
 def read_rows(
@@ -26,7 +26,7 @@ def read_rows(
         InputError: the file cannot be read.
         FileFormatError: no CSV in UTF-8, an empty file, a file that is too large.
     """
-    path, count = check_file(path, MAX_TABLE_BYTES), 0
+    path, count = check_size(path, MAX_TABLE_BYTES), 0
     try:
         with path.open(encoding="utf-8-sig", newline="") as stream:
             first = next((line for line in stream if line.strip()), "")

@@ -20,7 +20,7 @@ import numpy as np
 from mien.arrays import Array, Float, Int
 from mien.errors import FileFormatError
 from mien.limits import LARGEST, MAX_ARRAY_BYTES, MAX_ARRAYS, MAX_ARRAYS_BYTES, MIB
-from mien.reading.files import check_file, is_missing
+from mien.reading.files import check_size, is_missing
 
 _DAMAGED = (
     OSError,
@@ -63,7 +63,7 @@ class ArrayFile:
         # A folder or a pipe is damage to the folder that this file belongs to.
         if is_missing(self.path):
             raise FileFormatError(self.path, "there is no such file")
-        check_file(self.path, 2 * MAX_ARRAYS_BYTES)
+        check_size(self.path, 2 * MAX_ARRAYS_BYTES)
         try:
             with self.path.open("rb") as stream:
                 _check_directory(self.path, stream)

@@ -30,7 +30,7 @@ def read_json(path: str | Path) -> dict[str, Any]:
     """
     data = parse_json(path, read_text(path, MAX_JSON_BYTES, "JSON in UTF-8"))
     if not isinstance(data, dict):
-        raise FileFormatError(path, f"expected an object, found {kind_of(data)}")
+        raise FileFormatError(path, f"expected an object, found {json_type(data)}")
     return data
 
 
@@ -245,7 +245,7 @@ def unknown(kind: str, name: str, known: Collection[str]) -> str:
     return f"unknown {kind} {name!r}; expected one of {few}" if few else f"unknown {kind} {name!r}"
 
 
-def kind_of(value: object) -> str:
+def json_type(value: object) -> str:
     """What JSON calls a value like this one."""
     if value is None:
         return "null"
@@ -256,7 +256,7 @@ def kind_of(value: object) -> str:
 def complain(place: str, expected: str, value: object) -> NoReturn:
     """Raises: DocumentError: says what kind of value is there instead."""
     shown = f" {str(value)[:40]!r}" if isinstance(value, str) else ""
-    raise DocumentError(place, f"expected {expected}, found {kind_of(value)}{shown}")
+    raise DocumentError(place, f"expected {expected}, found {json_type(value)}{shown}")
 
 
 class _RepeatedName(Exception):

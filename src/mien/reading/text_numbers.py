@@ -10,7 +10,7 @@ from mien.limits import LARGEST, MAX_POINTS_BYTES
 from mien.reading.csv_rows import number_in
 from mien.reading.files import read_text
 
-MOST = 100_000
+_MAX_COUNT = 100_000
 """No file of points means more; a number beyond is no count."""
 
 
@@ -53,7 +53,7 @@ class Numbers:
             raise FileFormatError(self._path, problem, f"line {line}")
         return value
 
-    def whole(self, what: str, *, least: int = 0, below: int = MOST) -> int:
+    def whole(self, what: str, *, least: int = 0, below: int = _MAX_COUNT) -> int:
         """The next one, whole and within these limits. Raises: FileFormatError."""
         value = self.finite(what)
         if not (value.is_integer() and least <= value < below):

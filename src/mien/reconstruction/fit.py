@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.faces.detector import NO_FACE
+from mien.capture.faces.detector import NO_FACE_FOUND
 from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.progress import StepProgress
@@ -93,7 +93,7 @@ def _fit_views(
     faceless = [view for view in views if not view.marked]
     if not marked:
         names = ", ".join(view.photo.name for view in views)
-        raise EstimationError(f"{names}: {NO_FACE}")
+        raise EstimationError(f"{names}: {NO_FACE_FOUND}")
     left_out: dict[str, str] = {}
     while True:
         solution = solve_by_features(marked, gather_features(marked, generic), generic, options)
@@ -108,7 +108,7 @@ def _fit_views(
         solution = _all_photos(solution, faceless, generic, options, progress)
         left_out |= solution.problems
     else:
-        left_out |= {view.photo.name: NO_FACE for view in faceless}
+        left_out |= {view.photo.name: NO_FACE_FOUND for view in faceless}
     if options.adjust:
         solution = _guided(solution, generic)
     vertices, cameras = _in_head_space(solution, generic, options)

@@ -142,8 +142,8 @@ def _adjust(
         sigma_px=np.where(features.seen, features.sigma_px(cameras), 1.0),
         loss="cauchy",
         shape_prior=prior,
-        focal_prior=focal_beliefs(views),
-        focal_group=same_lens(views),
+        focal_prior=focal_priors(views),
+        focal_group=focal_groups(views),
     )
 
 
@@ -156,7 +156,7 @@ def _intersect(
     return rays.points, np.where(rays.solved, rays.residual_mm, PRIOR_DEVIATION_MM)
 
 
-def focal_beliefs(views: Sequence[CapturedView]) -> FocalPrior:
+def focal_priors(views: Sequence[CapturedView]) -> FocalPrior:
     """EXIF where the photo has it; otherwise anything from a phone to a cropped portrait."""
     known = [view.photo.focal_prior_px for view in views]
     diagonals = [float(np.hypot(*view.photo.size)) for view in views]
@@ -168,7 +168,7 @@ def focal_beliefs(views: Sequence[CapturedView]) -> FocalPrior:
     return FocalPrior(np.array(focal), np.array(deviation))
 
 
-def same_lens(views: Sequence[CapturedView]) -> Int[Array, " k"]:
+def focal_groups(views: Sequence[CapturedView]) -> Int[Array, " k"]:
     """(K,) the same number for photos of one lens: the frames of a video."""
     files = [view.photo.path for view in views]
     return np.array([files.index(file) for file in files])

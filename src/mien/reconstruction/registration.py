@@ -14,7 +14,7 @@ from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
 from mien.progress import StepProgress
-from mien.reconstruction.dense.joint import Lenses
+from mien.reconstruction.bundle.problem import FocalGroups
 from mien.reconstruction.dense.register import (
     SCALES_MM,
     Registration,
@@ -22,7 +22,7 @@ from mien.reconstruction.dense.register import (
     register_views,
 )
 from mien.reconstruction.features import gather_features
-from mien.reconstruction.landmark_fit import Solution, focal_beliefs, residuals_of, same_lens
+from mien.reconstruction.landmark_fit import Solution, focal_groups, focal_priors, residuals_of
 from mien.reconstruction.localization.localizer import place_views
 
 NOTHING_SHARED = (
@@ -87,8 +87,8 @@ def _registered(
     scales: Sequence[float],
     progress: StepProgress | None,
 ) -> Solution:
-    views, lenses = solution.views, _lenses(solution.views)
-    known = (views, solution.cameras, solution.vertices, solution.features, lenses, generic)
+    views, focal = solution.views, _focal_groups(solution.views)
+    known = (views, solution.cameras, solution.vertices, solution.features, focal, generic)
     found: Registration | None = None
     notes: tuple[str, ...] = ()
     if len(views) > 1:
@@ -153,11 +153,11 @@ def _far_turned(
     )
 
 
-def _lenses(views: Sequence[CapturedView]) -> Lenses:
-    focal = focal_beliefs(views)
-    group = np.unique(same_lens(views), return_inverse=True)[1].reshape(-1)
+def _focal_groups(views: Sequence[CapturedView]) -> FocalGroups:
+    focal = focal_priors(views)
+    group = np.unique(focal_groups(views), return_inverse=True)[1].reshape(-1)
     count = np.bincount(group)
-    return Lenses(
+    return FocalGroups(
         group,
         np.bincount(group, np.log(focal.focal_px)) / count,
         np.bincount(group, focal.deviation) / count,

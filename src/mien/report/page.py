@@ -89,7 +89,7 @@ def _photo(
     fit: PhotoFit,
     pixels: UInt8[Array, "h w 3"],
 ) -> dict[str, Any]:
-    yaw, pitch, roll = head_angles(fit.camera)
+    yaw, pitch, roll = head_angles_deg(fit.camera)
     return {
         "name": name,
         "width": fit.camera.width,
@@ -117,7 +117,7 @@ def _residual(mark: Mark) -> dict[str, Any]:
     }
 
 
-def head_angles(camera: Camera) -> tuple[float, float, float]:
+def head_angles_deg(camera: Camera) -> tuple[float, float, float]:
     """Degrees of yaw, pitch and roll of the head before the camera (docs/reference/conventions.md).
 
     The same three angles given to `mien render` show the head turned like that.

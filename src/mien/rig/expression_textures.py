@@ -27,10 +27,10 @@ from mien.rig.shading import (
     fit_polynomial,
 )
 from mien.texture.atlas import atlas_surface
-from mien.texture.expression import ExpressionLook, look_at_expression
+from mien.texture.expression import TextureLayer, extract_expression_layer
 from mien.texture.parts import SKIN
-from mien.texture.surface import SurfaceMap, over_vertices, parts_of
-from mien.texture.teeth import usual_teeth
+from mien.texture.surface import SurfaceMap, interpolate_vertex_values, part_mask
+from mien.texture.teeth import default_teeth_colours
 
 _GROUPS: Mapping[str, tuple[int, str]] = {
     "left_eyeball": (0, EYES),
@@ -97,7 +97,7 @@ def paint_expressions(
     looks = {
         name: _look(mesh, surface, item, name, base, generic) for name, item in photographed.items()
     }
-    texels = {part: parts_of(surface, mesh, part) for part in _GROUPS}
+    texels = {part: part_mask(surface, mesh, part) for part in _GROUPS}
     openings = Openings.of(generic, mesh.vertices)
     opened = {name: openings.measure(item.vertices) for name, item in photographed.items()}
     shading = _fit_shading(texels, looks, opened)
@@ -119,15 +119,15 @@ def _look(
     name: str,
     base: UInt8[Array, "h w 3"],
     generic: GenericHead,
-) -> ExpressionLook:
+) -> TextureLayer:
     mesh = neutral.with_vertices(item.vertices)
     if name != NEUTRAL:
         height, width = base.shape[:2]
         surface = atlas_surface(mesh, width=width, height=height)
     inside = np.maximum(generic.regions["mouth_cavity"], generic.regions["eye_socket"])
 
-    def seen_by(views: Sequence[int], within: Float[Array, " v"]) -> ExpressionLook:
-        return look_at_expression(
+    def seen_by(views: Sequence[int], within: Float[Array, " v"]) -> TextureLayer:
+        return extract_expression_layer(
             mesh,
             [item.cameras[k] for k in views],
             [item.photos[k] for k in views],
@@ -148,7 +148,7 @@ def _look(
         seen_by([_best_view(mesh, lines, item.cameras)], mask)
         for lines, mask in _slits(mesh, generic)
     ]
-    return reduce(ExpressionLook.beside, looks)
+    return reduce(TextureLayer.merged_with, looks)
 
 
 def _slits(mesh: Mesh, generic: GenericHead) -> list[tuple[Int[Array, " n"], Float[Array, " v"]]]:
@@ -185,7 +185,7 @@ def _best_view(mesh: Mesh, around: Int[Array, " n"], cameras: Sequence[Camera]) 
 
 def _fit_shading(
     texels: Mapping[str, Bool[Array, "h w"]],
-    looks: Mapping[str, ExpressionLook],
+    looks: Mapping[str, TextureLayer],
     opened: Mapping[str, Float[Array, " 3"]],
 ) -> dict[str, Polynomial]:
     """From how bright the expressions show the same texels."""
@@ -202,17 +202,17 @@ def _fit_shading(
 
 def _tint(surface: SurfaceMap, mesh: Mesh, base: UInt8[Array, "h w 3"]) -> Float[Array, " 3"]:
     """(3,) by how much the person's skin is darker or warmer than skin usually is in photos."""
-    skin = base[parts_of(surface, mesh, "skin")]
+    skin = base[part_mask(surface, mesh, "skin")]
     return np.clip(np.median(skin, axis=0) / np.array(SKIN.default), *_TINTS)
 
 
-def _by_seen(looks: Mapping[str, ExpressionLook], texels: Bool[Array, "h w"]) -> list[str]:
+def _by_seen(looks: Mapping[str, TextureLayer], texels: Bool[Array, "h w"]) -> list[str]:
     """The expressions from the one that shows least of the texels to the one that shows most."""
-    return sorted(looks, key=lambda name: float(looks[name].seen[texels].sum()))
+    return sorted(looks, key=lambda name: float(looks[name].confidence[texels].sum()))
 
 
-def _ratio(look: ExpressionLook, other: ExpressionLook, texels: Bool[Array, "h w"]) -> float | None:
-    both = texels & (look.seen > _SEEN) & (other.seen > _SEEN)
+def _ratio(look: TextureLayer, other: TextureLayer, texels: Bool[Array, "h w"]) -> float | None:
+    both = texels & (look.confidence > _SEEN) & (other.confidence > _SEEN)
     if np.count_nonzero(both) < _ENOUGH:
         return None
     here, there = (np.maximum(item.colours[both].mean(axis=1), 1.0) for item in (look, other))
@@ -223,7 +223,7 @@ def _common_parts(
     surface: SurfaceMap,
     mesh: Mesh,
     texels: Mapping[str, Bool[Array, "h w"]],
-    looks: Mapping[str, ExpressionLook],
+    looks: Mapping[str, TextureLayer],
     light: Mapping[str, Float[Array, " 3"]],
     base: UInt8[Array, "h w 3"],
     generic: GenericHead,
@@ -235,16 +235,16 @@ def _common_parts(
     """
     common = base.astype(np.float32)
     tint = _tint(surface, mesh, base)
-    places = over_vertices(surface, mesh, generic.mesh.vertices)
+    places = interpolate_vertex_values(surface, mesh, generic.mesh.vertices)
     for part, (column, _) in _GROUPS.items():
         inside = texels[part]
         colours = common[inside] / light[NEUTRAL][column]
         if part.endswith("teeth"):
-            colours = usual_teeth(places[inside], part)
+            colours = default_teeth_colours(places[inside], part)
         if column == _MOUTH:
             colours *= tint
         for name in _by_seen(looks, inside):
-            share = looks[name].share[inside][:, None]
+            share = looks[name].opacity[inside][:, None]
             own = looks[name].colours[inside] / light[name][column]
             colours += share * (own - colours)
         common[inside] = colours

@@ -16,7 +16,13 @@ def atlas_surface(
 ) -> SurfaceMap:
     """The surface under every texel of the mesh's own texture coordinates.
 
-    Where charts lie over each other, the first triangle counts.
+    Where charts overlap, the first triangle counts.
+
+    Args:
+        mesh: with texture coordinates.
+        width: texels.
+        height: texels.
+        parts: names of the parts to include; all by default.
 
     Raises:
         InputError: a mesh without texture coordinates.

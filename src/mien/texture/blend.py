@@ -12,15 +12,21 @@ from mien.numeric.images.sampling import bilinear_neighbours
 from mien.numeric.kernels.jit import njit
 from mien.numeric.kernels.threads import for_row_bands
 from mien.texture.surface import SurfaceMap
-from mien.texture.visibility import LEAST_CERTAINTY, View, camera_numbers, project_point, sight
+from mien.texture.visibility import (
+    MIN_CERTAINTY,
+    TextureView,
+    camera_parameters,
+    project_point,
+    surface_visibility,
+)
 
-# Certainties (cosines) between which a view's colours fade out: a texel that is seen at 80
-# degrees or more is a smear, at 70 degrees it is as good as its surroundings.
-FADE = (LEAST_CERTAINTY, 0.34)
+# Certainties (cosines) between which a view's colours fade out: at 80 degrees and more a texel is
+# smeared, at 70 degrees it is as sharp as its surroundings.
+FADE = (MIN_CERTAINTY, 0.34)
 
-# The feather blends one photo into another and is wide. Towards what is only filled a photo's
-# colours reach further: they stand by themselves from a third of the ramp on.
-_ALONE = 7 / 27
+# The feather between two photos is wide. Towards filled texels a photo's colours reach further:
+# they have full confidence from a third of the ramp on.
+_FULL_CONFIDENCE = 7 / 27
 
 
 @dataclass(frozen=True)
@@ -28,10 +34,9 @@ class Blend:
     """The photos' colours on a surface.
 
     Attributes:
-        colours: (H, W, 3) float32, 0 to 255; the weighted mean of the photos, zero where none sees.
+        colours: (H, W, 3) float32, 0 to 255; weighted mean of the photos, 0 where none shows it.
         coverage: (H, W) float32, the sum of the weights g_k.
-        confidence: (H, W) float32 in [0, 1]: how far the colour may stand by itself; below 1 it is
-            to be mixed with what fills the holes.
+        confidence: (H, W) float32 in [0, 1]; below 1 the colour is to be blended with the fill.
     """
 
     colours: Float[Array, "h w 3"]
@@ -41,7 +46,7 @@ class Blend:
 
 def blend_views(
     surface: SurfaceMap,
-    views: Sequence[View],
+    views: Sequence[TextureView],
     gains: Float[Array, "k 3"] | None = None,
     *,
     feather_mm: float,
@@ -51,8 +56,10 @@ def blend_views(
     """The convex combination of the photos on every texel ([Pighin 2002] sec. 5.2.1).
 
     Args:
+        surface: the texels.
+        views: K prepared photos.
         gains: (K, 3) factors on each photo's colours; 1 when None.
-        feather_mm: as for visibility.sight.
+        feather_mm: as for visibility.surface_visibility.
         certainty_power: g_k = F_k P_k^power; 1 in the paper.
         fade: cosines between which a photo's colours fade out.
     """
@@ -60,11 +67,11 @@ def blend_views(
     colours = np.zeros((*shape, 3), np.float32)
     coverage, confidence = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     for k, view in enumerate(views):
-        seen = sight(surface, view, feather_mm=feather_mm, least_certainty=fade[0])
+        visibility = surface_visibility(surface, view, feather_mm=feather_mm, min_certainty=fade[0])
         gain = np.ones(3) if gains is None else gains[k]
-        arrays = (surface.points, seen.feathered, seen.certainty, view.photo)
+        arrays = (surface.points, visibility.feathered, visibility.certainty, view.photo)
         inputs = [frozen(np.ascontiguousarray(array)) for array in arrays]
-        inputs += [camera_numbers(view.camera), frozen(np.asarray(gain, np.float32))]
+        inputs += [camera_parameters(view.camera), frozen(np.asarray(gain, np.float32))]
 
         def rows(first: int, end: int, inputs: list[Array] = inputs) -> None:
             _add_rows(*inputs, certainty_power, *fade, first, end, colours, coverage, confidence)
@@ -100,9 +107,9 @@ def _add_rows(
             cosine = certainty[row, col]
             weight = feathered[row, col] * (cosine if power == 1.0 else cosine**power)
             coverage[row, col] += weight
-            alone = min(feathered[row, col] / _ALONE, 1.0)
-            alone *= min(max((cosine - low) / (high - low), 0.0), 1.0)
-            confidence[row, col] = max(confidence[row, col], alone)
+            certain = min(feathered[row, col] / _FULL_CONFIDENCE, 1.0)
+            certain *= min(max((cosine - low) / (high - low), 0.0), 1.0)
+            confidence[row, col] = max(confidence[row, col], certain)
             x, y, z = points[row, col]
             px, py, _ = project_point(pose, x, y, z)
             x0, x1, y0, y1, fx, fy = bilinear_neighbours(px, py, width, height)

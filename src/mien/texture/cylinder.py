@@ -26,10 +26,10 @@ class Cylinder:
     """An upright cylinder.
 
     Attributes:
-        axis_x: mm, where its axis meets the plane y = 0.
-        axis_z: mm, where its axis meets the plane y = 0.
-        bottom: mm, the heights where v is 0 and 1.
-        top: mm, the heights where v is 0 and 1.
+        axis_x: mm, of its axis.
+        axis_z: mm, of its axis.
+        bottom: mm, the height where v is 0.
+        top: mm, the height where v is 1.
     """
 
     axis_x: float
@@ -75,6 +75,8 @@ def cylinder_surface(
     """The first surface that rays from the cylinder towards its axis meet.
 
     Args:
+        mesh: of the head.
+        cylinder: around it.
         width: texels.
         height: texels.
         parts: names of the parts that can be met; all by default.

@@ -1,4 +1,4 @@
-"""Photos to one texture: the view-independent texture map of [Pighin 2002] sec. 5.2.2."""
+"""One texture from photos: the view-independent texture map of [Pighin 2002] sec. 5.2.2."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from mien.texture.cylinder import Cylinder, cylinder_surface, fit_cylinder
 from mien.texture.equalize import estimate_gains
 from mien.texture.fill import (
     FILLS,
-    Backdrop,
     Fill,
+    SkinFill,
+    blend_over,
+    build_skin_fill,
     fill_part,
-    make_backdrop,
     mirror_difference,
     on_cylinder,
-    over,
 )
 from mien.texture.parts import SEE_THROUGH, SKIN, STYLES, PartStyle, fill_colour
 from mien.texture.subject import subject_mask
-from mien.texture.surface import SurfaceMap, cropped, mirrored, parts_of, restricted
-from mien.texture.visibility import View, prepare_view
+from mien.texture.surface import SurfaceMap, cropped, mirrored, part_mask, restricted
+from mien.texture.visibility import TextureView, prepare_view
 
 # The coarse cylinder on which photos are compared and holes are filled: 1 mm or so.
 _COARSE = (512, 256)
@@ -52,10 +52,10 @@ class Texture:
 
 @dataclass(frozen=True)
 class _Job:
-    """Everything that the parts of one texture have in common."""
+    """Inputs that all parts of one texture share."""
 
     mesh: Mesh
-    views: list[View]
+    views: list[TextureView]
     gains: Float[Array, "k 3"]
     feather_mm: float
     certainty_power: float
@@ -83,17 +83,17 @@ def extract_texture(
 
     Args:
         mesh: as it was fitted to the photos.
-        cameras: K of each, of the same sizes.
-        photos: K of each, of the same sizes.
+        cameras: K, one for each photo, of its size.
+        photos: K.
         surface: which texels to colour (cylinder_surface or atlas_surface of this mesh).
-        feather_mm: width of the ramp that ends each photo's part, along the surface.
-        certainty_power: weights are F_k P_k^power; more makes the best photo win more clearly.
-        equalize: even out exposure and white balance between photos.
-        fill: what becomes of texels that no photo shows; black with "none".
-        mirror: (V,) left-right partners; then those texels take the other side's colours first.
-        regions: (V,) soft masks by name (those of the generic head): hair, ears and neck are then
-            filled each from itself, and the mouth's inside is dark red.
-        find_subject: tell person from background in the photos; else trust the mesh's outline.
+        feather_mm: width of the ramp at each photo's boundary, along the surface.
+        certainty_power: weights are F_k P_k^power; a larger power favours the best photo.
+        equalize: equalize exposure and white balance between photos.
+        fill: how texels that no photo shows are filled; with "none" they are black.
+        mirror: (V,) left-right partners; if given, holes take the other side's colours first.
+        regions: (V,) soft masks by name (those of the generic head): hair, ears and neck are
+            each filled from themselves, and the inside of the mouth is dark red.
+        find_subject: segment the person in each photo; else the mesh's outline is used.
 
     Raises:
         InputError: counts and sizes that differ.
@@ -106,16 +106,16 @@ def extract_texture(
     """
     job = _prepare(mesh, cameras, photos, surface, feather_mm, fill, find_subject)
     job = replace(job, certainty_power=certainty_power)
-    job, backdrop = _look_around(job, equalize, mirror, regions or {})
-    pixels = _background(surface, backdrop)
+    job, skin_fill = _prepare_on_cylinder(job, equalize, mirror, regions or {})
+    pixels = _background(surface, skin_fill)
     coverage = np.zeros(surface.triangle_ids.shape, np.float32)
     for name in mesh.part_names:
-        texels = parts_of(surface, mesh, name)
+        texels = part_mask(surface, mesh, name)
         box = _box(texels, surface.wrap)
         if box is None:
             continue
         part = restricted(cropped(surface, box), texels[box])
-        colours, weights = _texture_part(job, part, name, backdrop)
+        colours, weights = _texture_part(job, part, name, skin_fill)
         pixels[box][part.mask] = colours[part.mask]
         coverage[box][part.mask] = weights[part.mask]
     result = np.clip(np.rint(pixels), 0, 255).astype(np.uint8)
@@ -124,13 +124,13 @@ def extract_texture(
     return Texture(result, coverage, job.gains)
 
 
-def _look_around(
+def _prepare_on_cylinder(
     job: _Job,
     equalize: bool,
     mirror: Int[Array, " v"] | None,
     regions: Mapping[str, Float[Array, " v"]],
-) -> tuple[_Job, Backdrop]:
-    """What is learned on a coarse cylinder: gains, the sides' difference, what fills the holes."""
+) -> tuple[_Job, SkinFill]:
+    """Estimates on a coarse cylinder: gains, difference between the sides, colours for holes."""
     mesh, (width, height) = job.mesh, _COARSE
     skin = ("skin",) if "skin" in mesh.part_names else mesh.part_names
     coarse = cylinder_surface(mesh, job.cylinder, width=width, height=height, parts=skin)
@@ -143,7 +143,7 @@ def _look_around(
         difference = mirror_difference(around, _blend(job, mirrored(coarse, mesh, mirror), SKIN))
         job = replace(job, mirror=mirror, mirror_difference=difference)
         around = _blend(job, coarse, SKIN)
-    return job, make_backdrop(coarse, mesh, around, job.cylinder, job.fill, regions)
+    return job, build_skin_fill(coarse, mesh, around, job.cylinder, job.fill, regions)
 
 
 def _prepare(
@@ -170,7 +170,7 @@ def _prepare(
 
 
 def _texture_part(
-    job: _Job, surface: SurfaceMap, name: str, backdrop: Backdrop
+    job: _Job, surface: SurfaceMap, name: str, skin_fill: SkinFill
 ) -> tuple[Float[Array, "h w 3"], Float[Array, "h w"]]:
     """Colours and coverage of one part."""
     style = STYLES.get(name, SKIN)
@@ -182,14 +182,14 @@ def _texture_part(
         return colours, blend.coverage
     colours = blend.colours.copy()
     holes = surface.mask & (blend.confidence < 1)
-    filled = backdrop.colours(surface, job.mesh, holes)
+    filled = skin_fill.colours(surface, job.mesh, holes)
     share = blend.confidence[holes][:, None]
     colours[holes] = filled + share * (colours[holes] - filled)
     return colours, blend.coverage
 
 
 def _blend(job: _Job, surface: SurfaceMap, style: PartStyle) -> Blend:
-    """The photos on one part, the other side's colours below them when there is a mirror map."""
+    """The photos on one part, over the other side's colours when there is a mirror map."""
     views, gains = job.views, job.gains
     shape = surface.triangle_ids.shape
     if style.photos == "none":
@@ -208,7 +208,7 @@ def _blend(job: _Job, surface: SurfaceMap, style: PartStyle) -> Blend:
     if style.photos == "best":
         single = [blended(surface, [k]) for k in everything]
         single.sort(key=lambda blend: -float(blend.coverage.sum()))
-        return reduce(over, single)
+        return reduce(blend_over, single)
     blend = blended(surface, everything)
     if job.mirror is None or job.mirror_difference is None:
         return blend
@@ -216,17 +216,17 @@ def _blend(job: _Job, surface: SurfaceMap, style: PartStyle) -> Blend:
     used = (other.confidence > 0) & (blend.confidence < 1)
     shift = on_cylinder(job.mirror_difference, job.cylinder, surface.points[used])
     other.colours[used] = np.clip(other.colours[used] + shift, 0, 255)
-    return over(blend, other)
+    return blend_over(blend, other)
 
 
-def _background(surface: SurfaceMap, backdrop: Backdrop) -> Float[Array, "h w 3"]:
-    """(H, W, 3) float32: what texels without a surface show, before gutters are filled."""
+def _background(surface: SurfaceMap, skin_fill: SkinFill) -> Float[Array, "h w 3"]:
+    """(H, W, 3) float32 colours of texels without a surface, before gutters are filled."""
     import cv2
 
     height, width = surface.triangle_ids.shape
     if not surface.wrap:
         return np.zeros((height, width, 3), np.float32)
-    return cv2.resize(backdrop.images[-1], (width, height), interpolation=cv2.INTER_LINEAR)
+    return cv2.resize(skin_fill.images[-1], (width, height), interpolation=cv2.INTER_LINEAR)
 
 
 def _box(texels: Bool[Array, "h w"], wrap: bool) -> tuple[slice, slice] | None:

@@ -1,4 +1,4 @@
-"""What no photo shows: the other side of the face, then the surroundings."""
+"""Holes in the texture: filled from the other side of the face, then from the surroundings."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from mien.numeric.images.sampling import sample_bilinear
 from mien.texture.blend import Blend
 from mien.texture.cylinder import Cylinder
 from mien.texture.parts import EARS, FILLED_ALONE, REGION_COLOURS
-from mien.texture.surface import SurfaceMap, over_vertices
+from mien.texture.surface import SurfaceMap, interpolate_vertex_values
 
 Fill = Literal["pyramid", "grow", "none"]
 FILLS: tuple[Fill, ...] = ("pyramid", "grow", "none")
 
 # A region is filled from itself when the photos show this many of its coarse texels (1 cm^2).
-_FEWEST = 80
+_MIN_TEXELS = 80
 
 
 def fill_image(blend: Blend, fill: Fill, *, wrap: bool) -> Float[Array, "h w 3"]:
-    """The colours with their holes filled, (H, W, 3) float32; half-certain ones are mixed in."""
+    """The colours with their holes filled, (H, W, 3) float32; uncertain ones are blended in."""
     if fill == "none":
         return blend.colours
     if fill == "grow":
         grown = fill_growing(blend.colours, blend.confidence > 0.5, wrap=wrap)
-        return mix(blend.colours, grown, blend.confidence)
+        return alpha_composite(blend.colours, grown, blend.confidence)
     return fill_pyramid(blend.colours, blend.confidence, wrap=wrap)
 
 
-def mix(
+def alpha_composite(
     colours: Float[Array, "h w 3"], below: Float[Array, "*c"], confidence: Float[Array, "h w"]
 ) -> Float[Array, "h w 3"]:
-    """Colours as far as they are certain, over what lies below (an image or one colour)."""
+    """Colours over an image or one colour, with their confidence as opacity."""
     mixed: Array = below + confidence[..., None] * (colours - below)
     return mixed.astype(np.float32)
 
@@ -46,19 +46,21 @@ def fill_part(blend: Blend, colour: Float[Array, " 3"], reach: float) -> Float[A
     """A part's holes filled with one colour, (H, W, 3) float32.
 
     Args:
-        reach: texels over which what is seen gives way to the colour; 0 for only where it is not
-            certain.
+        blend: the photos' colours.
+        colour: 0 to 255.
+        reach: texels over which the photos' colours give way to this one; with 0 it only replaces
+            what is uncertain.
     """
-    mixed = mix(blend.colours, colour, blend.confidence)
+    mixed = alpha_composite(blend.colours, colour, blend.confidence)
     if reach <= 1:
         return mixed
-    # Known so little, the colour only counts where it fills blocks of the pyramid that are wider
+    # With so little confidence the colour only counts in blocks of the pyramid that are wider
     # than twice the reach.
     return fill_pyramid(mixed, np.maximum(blend.confidence, 0.25 / reach**2))
 
 
-def over(blend: Blend, below: Blend) -> Blend:
-    """One blend over another: where the first is not certain, the second shows through."""
+def blend_over(blend: Blend, below: Blend) -> Blend:
+    """One blend composited over another, with its confidence as opacity."""
     share = (1 - blend.confidence) * below.confidence
     confidence = blend.confidence + share
     upper = (blend.confidence / np.maximum(confidence, 1e-12))[..., None]
@@ -67,8 +69,8 @@ def over(blend: Blend, below: Blend) -> Blend:
 
 
 @dataclass(frozen=True)
-class Backdrop:
-    """What the skin looks like where no photo shows it.
+class SkinFill:
+    """Colours of the skin where no photo shows it.
 
     Made on a coarse cylinder, which has no seams: a fill that is smooth there is smooth across
     every seam between charts of whatever layout.
@@ -76,7 +78,7 @@ class Backdrop:
     Attributes:
         cylinder: around the head.
         images: (R, H, W, 3) float32, for each region its colours continued over the cylinder.
-        masks: (R, V) how far each vertex belongs to the region; they sum to 1.
+        masks: (R, V) weight of each region at each vertex; they sum to 1.
     """
 
     cylinder: Cylinder
@@ -88,19 +90,19 @@ class Backdrop:
     ) -> Float[Array, "n 3"]:
         """(N, 3) float32 of chosen texels."""
         points = surface.points[texels]
-        shares = over_vertices(surface, mesh, self.masks.T)[texels]
+        shares = interpolate_vertex_values(surface, mesh, self.masks.T)[texels]
         total = np.zeros((len(points), 3), np.float32)
         for image, share in zip(self.images, shares.T, strict=True):
             inside = share > 1e-3
-            seen = on_cylinder(image, self.cylinder, points[inside])
-            total[inside] += share[inside, None] * seen
+            sampled = on_cylinder(image, self.cylinder, points[inside])
+            total[inside] += share[inside, None] * sampled
         return total
 
 
 def on_cylinder(
     image: Float[Array, "h w 3"], cylinder: Cylinder, points: Float[Array, "n 3"]
 ) -> Float[Array, "n 3"]:
-    """Colours of an image around the head, as points in head space (mm) see it."""
+    """Colours of an image on the cylinder at points in head space (mm)."""
     height, width = image.shape[:2]
     uvs = cylinder.uvs(points.astype(np.float64))
     # One column more at either end, so that lookups go around.
@@ -110,7 +112,7 @@ def on_cylinder(
 
 
 def mirror_difference(blend: Blend, other: Blend) -> Float[Array, "h w 3"]:
-    """What to add to the other side's colours so that they go on where the photos end.
+    """What to add to the other side's colours so that they join those of the photos.
 
     Args:
         blend: the photos on the coarse cylinder.
@@ -118,7 +120,7 @@ def mirror_difference(blend: Blend, other: Blend) -> Float[Array, "h w 3"]:
 
     Returns:
         (H, W, 3) float32: the difference where both are known, smoothed over 10 mm or so and
-        continued over the rest; light seldom falls alike on both sides.
+        continued over the rest; light is seldom the same on both sides.
     """
     import cv2
 
@@ -131,21 +133,24 @@ def mirror_difference(blend: Blend, other: Blend) -> Float[Array, "h w 3"]:
     return fill_pyramid(smooth, both, wrap=True)
 
 
-def make_backdrop(
+def build_skin_fill(
     coarse: SurfaceMap,
     mesh: Mesh,
     blend: Blend,
     cylinder: Cylinder,
     fill: Fill,
     regions: Mapping[str, Float[Array, " v"]],
-) -> Backdrop:
-    """The holes of the skin filled region by region, hair from hair and ears from ears.
+) -> SkinFill:
+    """The holes of the skin filled region by region: hair from hair, ears from ears.
 
     Args:
         coarse: the skin on the cylinder.
-        blend: the photos on it.
-        regions: (V,) soft masks by name; what they leave is filled from itself too. A region of
-            which the photos show next to nothing counts among the rest; an ear that they do not
+        mesh: of the head.
+        blend: the photos on the coarse cylinder.
+        cylinder: of the coarse surface.
+        fill: how holes are filled.
+        regions: (V,) soft masks by name; the rest of the skin is filled from itself too. A region
+            of which the photos show next to nothing belongs to the rest; an ear that they do not
             show is filled from the skin.
 
     Raises:
@@ -164,18 +169,18 @@ def make_backdrop(
         if name in regions:
             mask = np.minimum(check_array(name, regions[name], left.shape), left)
             own = _within(blend, coarse, mesh, mask)
-            if own.confidence.sum() < _FEWEST and name in EARS:
+            if own.confidence.sum() < _MIN_TEXELS and name in EARS:
                 own = _within(blend, coarse, mesh, 1 - np.maximum(scalp, ears))
-            if own.confidence.sum() < _FEWEST:
+            if own.confidence.sum() < _MIN_TEXELS:
                 continue
             masks.append(mask)
             images.append(fill_image(own, fill, wrap=True))
             left = left - mask
     rest = _within(blend, coarse, mesh, left)
-    if rest.confidence.sum() < _FEWEST:
+    if rest.confidence.sum() < _MIN_TEXELS:
         rest = _within(blend, coarse, mesh, 1 - ears)
     images.append(fill_image(rest if rest.confidence.any() else blend, fill, wrap=True))
-    return Backdrop(cylinder, np.stack(images), np.stack([*masks, left]))
+    return SkinFill(cylinder, np.stack(images), np.stack([*masks, left]))
 
 
 def _with_hair(
@@ -197,6 +202,6 @@ def _union(
 
 
 def _within(blend: Blend, surface: SurfaceMap, mesh: Mesh, mask: Float[Array, " v"]) -> Blend:
-    """The blend with nothing known outside a region, nor on its soft border."""
-    inside = over_vertices(surface, mesh, mask[:, None])[..., 0] > 0.9
+    """The blend without confidence outside a region and on its soft border."""
+    inside = interpolate_vertex_values(surface, mesh, mask[:, None])[..., 0] > 0.9
     return replace(blend, confidence=blend.confidence * inside)

@@ -1,4 +1,4 @@
-"""How each part of the head gets its colours: from which photos, and what where none shows it."""
+"""How each part of the head is coloured: from which photos, and how its holes are filled."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ class PartStyle:
     """How a part is textured.
 
     Attributes:
-        photos: "blend" all of them, take the "best" one and the others only where it sees nothing
-            ([Pighin 2002] sec. 5.2.4: what moves or is half hidden comes from one photo), or
+        photos: "blend" all of them; use the "best" one, and the others only where it shows nothing
+            ([Pighin 2002] sec. 5.2.4: what moves or is half hidden comes from one photo); or
             "none".
-        fill: what no photo shows is continued from the "surface" around it, takes the "white" of
-            what is seen, or the "default" colour.
-        default: 8-bit sRGB, where photos say nothing.
-        feather_mm: at most; small parts need narrow ramps.
-        reach_mm: how far what is seen spreads into a fill of one colour.
+        fill: holes are filled from the "surface" around them, with the "white" of the visible
+            texels, or with the "default" colour.
+        default: 8-bit sRGB.
+        feather_mm: upper limit; small parts need narrow ramps.
+        reach_mm: how far visible colours extend into a fill of one colour.
     """
 
     photos: Literal["blend", "best", "none"]
@@ -58,7 +58,7 @@ STYLES = {
 EARS = ("left_ear", "right_ear")
 FILLED_ALONE = (*EARS, "scalp", "neck")
 
-# Regions of the skin that photos do not show (mouth and nostrils inside), and their plain colours.
+# Regions of the skin that photos do not show (inside of mouth and nostrils), and their colours.
 REGION_COLOURS = {"mouth_cavity": (58, 26, 24)}
 
 # Parts that are so thin or so loosely modelled that they must not hide what is behind them.
@@ -73,16 +73,16 @@ def fill_colour(style: PartStyle, blend: Blend) -> Float[Array, " 3"]:
 
 
 def _white(blend: Blend, default: Float[Array, " 3"]) -> Float[Array, " 3"]:
-    """The tone of an eye's white: what is bright and grey among the colours that are seen."""
-    seen = blend.colours[blend.confidence > 0.5]
-    if len(seen) < 50:
+    """Colour of the sclera: the bright and grey ones of the visible colours."""
+    visible = blend.colours[blend.confidence > 0.5]
+    if len(visible) < 50:
         return default
-    brightness, spread = seen.mean(axis=1), np.ptp(seen, axis=1)
+    brightness, spread = visible.mean(axis=1), np.ptp(visible, axis=1)
     # Lids and lashes at the rim are dark or reddish, the iris is dark, the glint is the brightest.
     low, high = np.percentile(brightness, [60, 90])
     chosen = (brightness >= low) & (brightness <= high) & (spread <= np.median(spread) + 1)
     if not chosen.any():
         return default
-    tone = np.median(seen[chosen], axis=0)
-    # Some of it may be a lid's skin for all that: the light's brightness, but half of its hue.
+    tone = np.median(visible[chosen], axis=0)
+    # Some of it may still be skin of a lid: keep the brightness, but only half of the hue.
     return (tone + default * (tone.mean() / default.mean())) / 2

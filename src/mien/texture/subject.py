@@ -1,4 +1,4 @@
-"""Which pixels of a photo show the person and not what is behind."""
+"""Segmentation of the person in a photo."""
 
 from __future__ import annotations
 
@@ -12,25 +12,27 @@ from mien.numeric.raster.rasterizer import rasterize
 # Longest side of the small image that is segmented, px.
 _SIDE = 240
 # Space around the mesh that is segmented with it, as a share of its size.
-_SPACE = 0.2
+_BORDER = 0.2
 # Width of the strip on both sides of the mesh's outline in which the cut may run, as a share of
 # the head's size in the photo.
 _STRIP = 0.06
 
 
 def subject_mask(
-    mesh: Mesh, camera: Camera, photo: UInt8[Array, "h w 3"], *, least_contrast: float = 12.0
+    mesh: Mesh, camera: Camera, photo: UInt8[Array, "h w 3"], *, min_contrast: float = 12.0
 ) -> Bool[Array, "h w"]:
-    """Pixels that show the person rather than the background, as far as the mesh reaches.
+    """Pixels that show the person rather than the background, around the mesh.
 
-    A graph cut on colours, started from the mesh as the camera sees it: well inside its outline is
-    the person, well outside is not, and only in a strip between them the cut decides. Where both
-    sides of the strip look alike (dark hair before a dark wall) a cut would be a guess, and the
-    mesh's outline stands.
+    A graph cut on colours, initialized with the projected mesh: pixels well inside its outline are
+    foreground, pixels well outside are background, and the cut decides in the strip between. Where
+    the colours on both sides are alike (dark hair before a dark wall), the mesh's outline is kept.
 
     Args:
-        least_contrast: how far the colours of the two sides must lie apart (root of the summed
-            squares of 8-bit differences) for the cut to count there.
+        mesh: of the head, without parts that one can see through.
+        camera: of the photo.
+        photo: (H, W, 3).
+        min_contrast: least difference between the colours of the two sides (Euclidean, 8-bit) for
+            the cut to be used there.
     """
     import cv2
 
@@ -45,7 +47,7 @@ def subject_mask(
     pixels = (camera.project(mesh.vertices) - [left, top]) * scale
     inside = rasterize(pixels, camera.to_camera(mesh.vertices)[:, 2], mesh.triangles, *size).mask
     strip = max(2.0, _STRIP * float(np.sqrt(inside.sum())))
-    trusted = _contrast(small, inside, strip) > least_contrast
+    trusted = _contrast(small, inside, strip) > min_contrast
     mask = inside.astype(np.float32)
     if trusted.any():
         mask[trusted] = _cut(small, inside, strip)[trusted]
@@ -56,17 +58,14 @@ def subject_mask(
 
 
 def _outline(mesh: Mesh, camera: Camera) -> tuple[int, int, int, int] | None:
-    """Left, top, right, bottom (px) of what is to be looked at: the mesh and some space around
-
-    it; None when it is not in the photo.
-    """
+    """Left, top, right, bottom (px) around mesh and border; None if they are not in the photo."""
     used = np.unique(mesh.triangles)
     in_camera = camera.to_camera(mesh.vertices[used])
     if not (in_camera[:, 2] > 0).all():
         return None
     pixels = camera.project(mesh.vertices[used])
     low, high = pixels.min(axis=0), pixels.max(axis=0)
-    space = _SPACE * float((high - low).max())
+    space = _BORDER * float((high - low).max())
     left, top = (max(0, int(edge - space)) for edge in low)
     right, bottom = (
         min(limit, int(np.ceil(edge + space)))
@@ -94,9 +93,9 @@ def _cut(image: Array, inside: Array, strip: float) -> Bool[Array, "h w"]:
 
 
 def _contrast(image: Array, inside: Array, strip: float) -> Array:
-    """How unlike the colours inside and outside the outline are around each pixel; 0 where only
+    """(H, W) difference of the mean colours inside and outside the outline around each pixel.
 
-    one of them is near.
+    0 where only one of them is near.
     """
     import cv2
 

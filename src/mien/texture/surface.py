@@ -1,4 +1,4 @@
-"""The piece of a head's surface that each pixel of a texture stands for."""
+"""The point on a head's surface for each pixel of a texture."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class SurfaceMap:
         normals: (H, W, 3) float32, unit, outward.
         triangle_ids: (H, W) int32 into the mesh's triangles, -1 where there is no surface.
         barycentrics: (H, W, 3) float32.
-        texel_mm: how far apart neighbouring texels lie on the surface: the median.
+        texel_mm: median distance of neighbouring texels on the surface.
         wrap: the left and right ends touch, as on a cylinder.
     """
 
@@ -45,7 +45,7 @@ def surface_from(
     *,
     wrap: bool = False,
 ) -> SurfaceMap:
-    """The surface under texels whose triangles and places in them are known.
+    """The surface map from the triangle and the barycentrics of every texel.
 
     Raises:
         InputError: no two neighbouring texels.
@@ -55,15 +55,15 @@ def surface_from(
     return SurfaceMap(points, normals, triangle_ids, barycentrics, texel_mm, wrap)
 
 
-def over_vertices(
+def interpolate_vertex_values(
     surface: SurfaceMap, mesh: Mesh, values: Float[Array, "v c"]
 ) -> Float[Array, "h w c"]:
-    """Values at the mesh's vertices, interpolated over the texels; zero where there is none."""
+    """Values at the mesh's vertices, interpolated over the texels; 0 where there is no surface."""
     raster = Raster(surface.triangle_ids, surface.barycentrics, np.empty((0, 0), np.float32))
     return interpolate(raster, mesh.triangles, values)
 
 
-def parts_of(surface: SurfaceMap, mesh: Mesh, *names: str) -> Bool[Array, "h w"]:
+def part_mask(surface: SurfaceMap, mesh: Mesh, *names: str) -> Bool[Array, "h w"]:
     """(H, W) bool: texels on the named parts; parts that the mesh has not are left out."""
     wanted = [mesh.part_names.index(name) for name in names if name in mesh.part_names]
     chosen = np.append(np.isin(mesh.part, wanted), False)
@@ -89,15 +89,15 @@ def cropped(surface: SurfaceMap, box: tuple[slice, slice]) -> SurfaceMap:
 
 
 def mirrored(surface: SurfaceMap, mesh: Mesh, mirror: Int[Array, " v"]) -> SurfaceMap:
-    """For every texel the place on the other side of the head that looks like it.
+    """The surface map with every texel at its mirror point on the other side of the head.
 
     Args:
+        surface: to be mirrored; normals are mirrored too, so that visibility is computed there.
+        mesh: the surface's.
         mirror: (V,) index of each vertex's left-right partner.
 
     Raises:
         InputError: a mirror map of another mesh.
-
-    Normals are those of the other side too, so that visibility and certainty are judged there.
     """
     if np.shape(mirror) != (len(mesh.vertices),):
         raise InputError("mirror", f"{len(mesh.vertices)} indices", f"shape {np.shape(mirror)}")
@@ -110,7 +110,7 @@ def mirrored(surface: SurfaceMap, mesh: Mesh, mirror: Int[Array, " v"]) -> Surfa
 def _points_and_normals(
     mesh: Mesh, triangle_ids: Array, barycentrics: Array, vertices: Array | slice
 ) -> tuple[Array, Array]:
-    """Interpolated over the texels, each vertex standing for the one given for it."""
+    """Interpolated over the texels, with each vertex replaced by the given one."""
     raster = Raster(triangle_ids, barycentrics, np.empty((0, 0), np.float32))
     points = interpolate(raster, mesh.triangles, mesh.vertices[vertices])
     normals = interpolate(raster, mesh.triangles, mesh.vertex_normals()[vertices])

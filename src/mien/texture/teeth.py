@@ -1,4 +1,4 @@
-"""Teeth that no photo shows: the usual ones, so that an open mouth has teeth and not a band."""
+"""Default colours of teeth that no photo shows, tooth by tooth."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _CROWN_MM = 12.0
 _ENAMEL, _GUM = (226.0, 212.0, 190.0), (152.0, 86.0, 80.0)
 _GAP_MM, _GAP_DEPTH = 0.7, 0.5
 _FAR_MM, _FAR_LIGHT = 32.0, 0.25
-"""Teeth so far behind the foremost get so little light."""
+"""At this distance behind the foremost teeth the light falls to this factor."""
 
 
-def usual_teeth(points: Float[Array, "n 3"], part: str) -> Float[Array, "n 3"]:
-    """(N, 3) sRGB from 0 to 255 in full light.
+def default_teeth_colours(points: Float[Array, "n 3"], part: str) -> Float[Array, "n 3"]:
+    """(N, 3) sRGB of typical teeth and gums, from 0 to 255, in full light.
 
     Args:
-        points: (N, 3) mm, places on the teeth of the generic head.
+        points: (N, 3) mm, on the teeth of the generic head.
         part: "upper_teeth" or "lower_teeth".
     """
     if not len(points):

@@ -1,4 +1,4 @@
-"""Which photo sees which texel, and how well: visibility, positional certainty, feathering."""
+"""Visibility of texels in photos: depth test, positional certainty, feathering."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from mien.texture.surface import SurfaceMap
 # Two neighbouring pixels of the depth map that differ by more lie on different layers. One pixel
 # is a fraction of a millimetre wide: no surface that could be textured is so steep.
 _JUMP_MM = 3.0
-_STEEPEST = 4.0
-# What the camera sees of a surface steeper than this (80 degrees) is no use.
-LEAST_CERTAINTY = 0.17
+_MAX_SLOPE = 4.0
+# Cosine: a surface seen at a more grazing angle (80 degrees) is not used.
+MIN_CERTAINTY = 0.17
 
 
 @dataclass(frozen=True)
-class View:
-    """A photo made ready to be sampled.
+class TextureView:
+    """A photo prepared for sampling.
 
     Attributes:
         camera: of the photo as it is here (perhaps smaller than the original).
         photo: (H, W, 3) uint8.
         depth: (H, W) float32 mm, of the nearest surface that hides others; infinite beside it.
-        usable: (H, W) bool: pixels that show the head for certain: not the background, not so near
-            an outline that a small error of the shape puts something else there.
+        usable: (H, W) bool: pixels that reliably show the head: not the background, and not so near
+            to an outline that a small error of the shape would change what they show.
     """
 
     camera: Camera
@@ -43,8 +43,8 @@ class View:
 
 
 @dataclass(frozen=True)
-class Sight:
-    """How one view sees the texels of a surface.
+class Visibility:
+    """Visibility of a surface's texels in one view.
 
     Attributes:
         feathered: (H, W) float32, F_k: 1 where the texel is visible, ramped to 0 at the boundary.
@@ -65,11 +65,13 @@ def prepare_view(
     outline_mm: float = 3.0,
     edge_mm: float = 1.0,
     hidden_mm: float = 3.0,
-) -> View:
+) -> TextureView:
     """The photo with its depth map (the Z-buffer of [Pighin 2002] sec. 5.2.1).
 
     Args:
-        mesh: everything that hides something.
+        mesh: everything that occludes.
+        camera: of the photo.
+        photo: (H, W, 3) uint8.
         texel_mm: the photo is halved while its pixels are much finer than this.
         subject: pixels that show the person; all when None.
         outline_mm: how far from the mesh's outline in the photo a pixel has to be to be used.
@@ -90,27 +92,29 @@ def prepare_view(
         subject = None if subject is None else subject[1::2, 1::2]
     pixels = camera.project(mesh.vertices)
     raster = rasterize(pixels, in_camera[:, 2], mesh.triangles, camera.width, camera.height)
-    usable = _trusted_pixels(raster.depth, pixel_mm, outline_mm, edge_mm, hidden_mm)
+    usable = _reliable_pixels(raster.depth, pixel_mm, outline_mm, edge_mm, hidden_mm)
     if subject is not None:
         usable &= subject[: camera.height, : camera.width]
-    return View(camera, photo, raster.depth, usable)
+    return TextureView(camera, photo, raster.depth, usable)
 
 
-def sight(
+def surface_visibility(
     surface: SurfaceMap,
-    view: View,
+    view: TextureView,
     *,
     feather_mm: float = 12.0,
     tolerance_mm: float = 1.5,
-    least_certainty: float = LEAST_CERTAINTY,
-) -> Sight:
+    min_certainty: float = MIN_CERTAINTY,
+) -> Visibility:
     """Feathered visibility F_k and positional certainty P_k of a surface in one view.
 
     Args:
+        surface: the texels.
+        view: the photo.
         feather_mm: width of the ramp from invisible to fully visible, along the surface.
-        tolerance_mm: how far behind the depth map a visible point can lie; more where the surface
-            is steep, by what its depth changes within a pixel.
-        least_certainty: cosine below which a texel counts as turned away.
+        tolerance_mm: how far behind the depth map a visible point can lie; on a steep surface the
+            change of its depth within a pixel is added.
+        min_certainty: cosine below which a texel counts as turned away.
 
     Source:
         [Pighin 2002] sec. 5.2.1 and 5.2.2, steps 1 and 2. A texel is visible when it is inside the
@@ -122,17 +126,17 @@ def sight(
     certainty = np.zeros((height, width), np.float32)
     arrays = (surface.points, surface.normals, surface.triangle_ids, view.depth, view.usable)
     inputs = [frozen(np.ascontiguousarray(array)) for array in arrays]
-    pose = camera_numbers(view.camera)
+    pose = camera_parameters(view.camera)
 
     def rows(first: int, end: int) -> None:
-        _see_rows(*inputs, pose, tolerance_mm, least_certainty, first, end, visible, certainty)
+        _visibility_rows(*inputs, pose, tolerance_mm, min_certainty, first, end, visible, certainty)
 
     for_row_bands(rows, height, work=width * height)
-    # Beyond a chart's edge nothing is known, so it does not count as a boundary.
-    seen = (visible > 0) | (surface.triangle_ids < 0)
-    feathered = feather(seen, feather_mm / surface.texel_mm, wrap=surface.wrap)
+    # A chart's edge does not count as a boundary of visibility.
+    unoccluded = (visible > 0) | (surface.triangle_ids < 0)
+    feathered = feather(unoccluded, feather_mm / surface.texel_mm, wrap=surface.wrap)
     feathered[surface.triangle_ids < 0] = 0
-    return Sight(feathered, certainty)
+    return Visibility(feathered, certainty)
 
 
 def feather(
@@ -141,6 +145,8 @@ def feather(
     """1 inside, 0 outside, and between them the cubic 3 t^2 - 2 t^3 over `width` pixels inwards.
 
     Args:
+        visible: (H, W).
+        width: px.
         wrap: left and right ends touch.
 
     Source:
@@ -159,7 +165,7 @@ def feather(
     return ramp
 
 
-def camera_numbers(camera: Camera) -> Float[Array, " 18"]:
+def camera_parameters(camera: Camera) -> Float[Array, " 18"]:
     """Rotation, translation, focal length, principal point and centre, for the kernels."""
     parts = (
         camera.R_cam_head.ravel(),
@@ -189,12 +195,14 @@ def _halved_camera(camera: Camera) -> Camera:
     )
 
 
-def _trusted_pixels(
+def _reliable_pixels(
     depth: Array, pixel_mm: float, outline_mm: float, edge_mm: float, hidden_mm: float
 ) -> Bool[Array, "h w"]:
-    """Pixels where a small error of the shape puts nothing else.
+    """Pixels that a small error of the shape does not change.
 
     Args:
+        depth: (H, W) mm.
+        pixel_mm: size of a pixel at the head.
         outline_mm: from the mesh's outline.
         edge_mm: from an edge inside it, on either side.
         hidden_mm: from such an edge on the side of what is hidden: there another layer's colours
@@ -211,18 +219,18 @@ def _trusted_pixels(
         ahead[axis], behind[axis] = slice(1, None), slice(None, -1)
         edges[tuple(ahead)] |= jump
         edges[tuple(behind)] |= jump
-    trusted = _distance(inside) > outline_mm / pixel_mm
-    trusted &= _distance(~(edges & inside)) > edge_mm / pixel_mm
+    reliable = _distance(inside) > outline_mm / pixel_mm
+    reliable &= _distance(~(edges & inside)) > edge_mm / pixel_mm
     reach = round(hidden_mm / pixel_mm)
     if reach > 0:
         nearest = cv2.erode(layers, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
         # A steep surface alone gains this much within the reach.
-        trusted &= layers - nearest <= _JUMP_MM + _STEEPEST * hidden_mm
-    return trusted
+        reliable &= layers - nearest <= _JUMP_MM + _MAX_SLOPE * hidden_mm
+    return reliable
 
 
 def _distance(mask: Bool[Array, "h w"]) -> Float[Array, "h w"]:
-    """To the nearest pixel outside the mask; the photo's border is none."""
+    """Distance to the nearest pixel outside the mask; the photo's border does not count."""
     import cv2
 
     return cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
@@ -239,7 +247,7 @@ def _ramp_rows(distance: Array, width: float, first: int, end: int) -> None:
 
 @njit(cache=True, nogil=True)
 def project_point(pose: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Pixel and depth of a point; pose as camera_numbers makes it."""
+    """Pixel and depth of a point; pose as given by camera_parameters."""
     depth = pose[6] * x + pose[7] * y + pose[8] * z + pose[11]
     scale = pose[12] / depth
     column = scale * (pose[0] * x + pose[1] * y + pose[2] * z + pose[9]) + pose[13]
@@ -260,7 +268,7 @@ def _is_shown(depth_map: Array, usable: Array, x: float, y: float, nearest: floa
 
 
 @njit(cache=True, nogil=True)
-def _see_rows(
+def _visibility_rows(
     points: Array,
     normals: Array,
     ids: Array,

@@ -360,11 +360,12 @@ def test_missing_folder_and_forbidden(tmp_path: Path, monkeypatch: pytest.Monkey
     def refuse(*_: object) -> None:
         raise PermissionError(13, "Permission denied")
 
+    (tmp_path / "c.jpg").touch()
     monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(
         InputError, match="expected a photo that can be read, got Permission denied"
     ):
-        load_photo(tmp_path / "b.jpg")
+        load_photo(tmp_path / "c.jpg")
 
 
 def test_floating_point_samples(tmp_path: Path) -> None:

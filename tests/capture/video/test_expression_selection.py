@@ -6,8 +6,8 @@ import pytest
 from clips import clip, scored
 from mien.arrays import Array
 from mien.capture.video.expression_selection import (
-    DIFFERENT,
-    MOST,
+    MAX_EXPRESSIONS,
+    MIN_DISTANCE,
     choose_expressions,
     name_expressions,
 )
@@ -27,15 +27,17 @@ def test_the_farthest_comes_first() -> None:
 def test_each_is_the_farthest_from_all_before(rng: np.random.Generator) -> None:
     scores = clip([0] * 60, scores=list(rng.uniform(0, 1, size=(60, 52)) * (rng.random(52) < 0.3)))
     chosen = choose_expressions(scores, 0)
-    assert 1 < len(chosen) <= MOST
+    assert 1 < len(chosen) <= MAX_EXPRESSIONS
     distance = expression_distance(scores.blendshapes, 0)
     for row in chosen:
         assert row == distance.argmax(), "frames that differ so much have no like ones"
-        assert distance[row] >= DIFFERENT
+        assert distance[row] >= MIN_DISTANCE
         distance = np.minimum(distance, expression_distance(scores.blendshapes, row))
 
 
-@pytest.mark.parametrize(("score", "chosen"), [(DIFFERENT - 0.01, []), (DIFFERENT + 0.01, [1])])
+@pytest.mark.parametrize(
+    ("score", "chosen"), [(MIN_DISTANCE - 0.01, []), (MIN_DISTANCE + 0.01, [1])]
+)
 def test_what_differs_too_little_is_no_expression(score: float, chosen: list[int]) -> None:
     scores = clip([0, 0], scores=[REST, scored(jawOpen=score)])
     assert choose_expressions(scores, 0).tolist() == chosen
@@ -66,7 +68,7 @@ def test_no_more_than_asked_for(count: int, chosen: list[int]) -> None:
 
 def test_as_many_as_differ_up_to_a_number_when_none_is_asked_for() -> None:
     scores = clip([0] * 21, scores=[REST, *np.eye(52)[25:45]])
-    assert len(choose_expressions(scores, 0)) == MOST
+    assert len(choose_expressions(scores, 0)) == MAX_EXPRESSIONS
     assert len(choose_expressions(scores, 0, 12)) == 12
 
 

@@ -10,15 +10,14 @@ import pytest
 from mien.errors import InputError
 from mien.numeric.rotation import angle_between, rotation_from_vector
 from mien.numeric.solvers.robust import loss_named
-from mien.reconstruction.bundle.adjustment import FocalPrior, ShapePrior, adjust_bundle
+from mien.reconstruction.bundle.adjustment import FocalPrior, Posterior, ShapePrior, adjust_bundle
 from mien.reconstruction.bundle.problem import (
-    Bundle,
-    BundleData,
-    bundle_cost,
-    bundle_jacobians,
-    bundle_residuals,
-    linearize_bundle,
-    move_bundle,
+    BundleProblem,
+    BundleState,
+    CameraPrior,
+    FocalGroups,
+    Observations,
+    PointPrior,
 )
 
 
@@ -40,72 +39,82 @@ def disturbed(scene, rng, size=1.0):
     return cameras, scene.points + size * rng.normal(size=scene.points.shape)
 
 
+def posterior_of(scene, cameras, sigma_px, *, focal, sigma=0.5, loss="linear", marginal=False):
+    """The problem of these cameras; sigma is the points' prior deviation, infinite for none."""
+    photo, point = np.nonzero(np.isfinite(scene.image_points[..., 0]))
+    observations = Observations(
+        photo,
+        point,
+        scene.image_points[photo, point],
+        sigma_px[photo, point],
+        np.ones(len(photo), bool),
+    )
+    count = len(scene.points)
+    components = scene.components if np.isfinite(sigma) else scene.components[:0]
+    prior = PointPrior(scene.generic, components, np.tile(np.eye(3) / sigma**2, (count, 1, 1)))
+    R = np.stack([camera.R_cam_head for camera in cameras])
+    t = np.stack([camera.t_cam_head for camera in cameras])
+    poses = CameraPrior(R, t, focal, np.full(6, np.inf))
+    problem = BundleProblem(cameras, observations, prior, poses)
+    return Posterior(problem, loss_named(loss), np.full(count, sigma) if marginal else None)
+
+
 def problem_of(scene, rng, *, loss="linear", shared=False):
-    """A bundle near the truth and its data, every kind of prior included."""
-    seen = np.isfinite(scene.image_points).all(axis=2)
-    principal = np.stack([camera.principal for camera in scene.cameras])
+    """A state near the truth and its posterior, every kind of prior included."""
     cameras, points = disturbed(scene, rng, 0.3)
     group = np.zeros(5, int) if shared else np.arange(5)
     log_focal = np.log([camera.focal_px for camera in cameras])[: group.max() + 1]
-    data = BundleData(
-        image=np.where(seen[..., None], scene.image_points - principal[:, None], 0.0),
-        precision=seen * rng.uniform(0.5, 2, seen.shape),
-        group=group,
-        log_focal_mean=log_focal + 0.1,
-        log_focal_precision=np.full(len(log_focal), 5.0),
-        shape=prior_of(scene),
-        loss=loss_named(loss),
-        marginal=True,
-    )
-    bundle = Bundle(
-        np.stack([camera.R_cam_head for camera in cameras]),
-        np.stack([camera.t_cam_head for camera in cameras]),
-        log_focal,
-        points,
-        rng.normal(size=len(scene.components)),
-    )
-    return bundle, data
+    focal = FocalGroups(group, log_focal + 0.1, np.full(len(log_focal), 0.2))
+    sigma_px = 1 / rng.uniform(0.5, 2, scene.image_points.shape[:2])
+    posterior = posterior_of(scene, cameras, sigma_px, focal=focal, loss=loss, marginal=True)
+    state = BundleState.of(cameras, points, np.arange(5), 0)
+    coefficients = rng.normal(size=len(scene.components))
+    return replace(state, log_focal=log_focal, coefficients=coefficients), posterior
 
 
-def step_along(bundle, index, size):
+def step_along(state, index, size):
     """One of all unknowns moved: pose, focal, coefficient or point coordinate."""
-    common = 6 * len(bundle.R) + len(bundle.log_focal) + len(bundle.coefficients)
-    flat = np.zeros(common + bundle.points.size)
+    common = 6 * len(state.R) + len(state.log_focal) + len(state.coefficients)
+    flat = np.zeros(common + state.points.size)
     flat[index] = size
-    return move_bundle(bundle, (flat[:common], flat[common:].reshape(-1, 3)))
+    return state.moved(flat[:common], flat[common:].reshape(-1, 3))
 
 
 def test_jacobian_against_central_differences(make_scene, rng):
-    bundle, data = problem_of(make_scene(0), rng)
-    by_photo, by_point = bundle_jacobians(bundle, data)
+    state, posterior = problem_of(make_scene(0), rng)
+    problem = posterior.problem
+    seen, projection = problem.observations, problem.project(state, state.points)
+    by_photo, by_point = projection.camera_jacobian(), projection.point_jacobian
     h = 1e-5
 
     def numeric(index):
-        ahead, behind = (bundle_residuals(step_along(bundle, index, s), data) for s in (h, -h))
+        moved = (step_along(state, index, s) for s in (h, -h))
+        ahead, behind = (problem.project(item, item.points).image_points for item in moved)
         return (ahead - behind) / (2 * h)
 
     for k in (0, 3):
+        own = seen.photo == k
         for unknown in range(6):
             np.testing.assert_allclose(
-                numeric(6 * k + unknown)[k], by_photo[k, ..., unknown], rtol=1e-6, atol=1e-5
+                numeric(6 * k + unknown)[own], by_photo[own, :, unknown], rtol=1e-6, atol=1e-5
             )
-        np.testing.assert_allclose(numeric(30 + k)[k], by_photo[k, ..., 6], rtol=1e-6, atol=1e-5)
-    first_point = 35 + len(bundle.coefficients)
+        np.testing.assert_allclose(numeric(30 + k)[own], by_photo[own, :, 6], rtol=1e-6, atol=1e-5)
+    first_point, own = 35 + len(state.coefficients), seen.point == 7
     for axis in range(3):
         np.testing.assert_allclose(
-            numeric(first_point + 3 * 7 + axis)[:, 7], by_point[:, 7, :, axis], atol=1e-6
+            numeric(first_point + 3 * 7 + axis)[own], by_point[own, :, axis], atol=1e-6
         )
 
 
 @pytest.mark.parametrize("loss", ["linear", "huber", "cauchy"])
 @pytest.mark.parametrize("shared", [False, True])
 def test_gradient_against_central_differences(make_scene, rng, loss, shared):
-    bundle, data = problem_of(make_scene(0, noise=2), rng, loss=loss, shared=shared)
-    system = linearize_bundle(bundle, data)
+    state, posterior = problem_of(make_scene(0, noise=2), rng, loss=loss, shared=shared)
+    system = posterior.normal_equations(state)
     gradient = np.append(system.common_gradient, system.block_gradient.ravel())
     for index in [*range(0, len(system.common_gradient), 3), len(gradient) - 5]:
         h = 1e-5
-        ahead, behind = (bundle_cost(step_along(bundle, index, s), data) for s in (h, -h))
+        ahead, behind = (posterior.cost(step_along(state, index, s)) for s in (h, -h))
         assert (ahead - behind) / (2 * h) == pytest.approx(gradient[index], rel=1e-4, abs=1e-3)
 
 
@@ -131,27 +140,24 @@ def test_no_small_change_fits_better(make_scene, rng, loss, with_prior):
         shape_prior=prior_of(scene) if with_prior else None,
         tolerance=1e-14,
     )
-    _, data = problem_of(scene, rng, loss=loss)
-    data = replace(
-        data,
-        precision=np.isfinite(scene.image_points[..., 0]).astype(float),
-        log_focal_precision=np.zeros(5),
-        shape=prior_of(scene) if with_prior else None,
+    posterior = posterior_of(
+        scene,
+        result.cameras,
+        np.ones(scene.image_points.shape[:2]),
+        focal=FocalGroups(np.arange(5), np.zeros(5), np.full(5, np.inf)),
+        sigma=0.5 if with_prior else np.inf,
+        loss=loss,
+        marginal=with_prior,
     )
-    best = Bundle(
-        np.stack([camera.R_cam_head for camera in result.cameras]),
-        np.stack([camera.t_cam_head for camera in result.cameras]),
-        np.log([camera.focal_px for camera in result.cameras]),
-        result.points,
-        result.coefficients,
-    )
-    assert bundle_cost(best, data) == pytest.approx(result.cost)
+    best = BundleState.of(result.cameras, result.points, np.arange(5), 0)
+    best = replace(best, coefficients=result.coefficients)
+    assert posterior.cost(best) == pytest.approx(result.cost)
     seen = np.flatnonzero(np.isfinite(scene.image_points[..., 0]).any(axis=0))
     first_point = 35 + len(best.coefficients)
     unknowns = [*range(first_point), *(first_point + 3 * seen[:5, None] + np.arange(3)).ravel()]
     for index in unknowns:
         for h in (-1e-4, 1e-4):
-            assert bundle_cost(step_along(best, index, h), data) > result.cost
+            assert posterior.cost(step_along(best, index, h)) > result.cost
 
 
 def test_prior_fixes_the_frame(make_scene, rng):
@@ -349,32 +355,19 @@ def test_agrees_with_scipy(make_scene, rng):
         marginal=False,
         tolerance=1e-13,
     )
-    principal = np.stack([camera.principal for camera in cameras])
-    data = BundleData(
-        image=scene.image_points - principal[:, None],
-        precision=np.ones((3, 13)),
-        group=np.arange(3),
-        log_focal_mean=np.zeros(3),
-        log_focal_precision=np.zeros(3),
-        shape=prior_of(scene),
-        loss=loss_named("linear"),
-    )
-    start = Bundle(
-        np.stack([camera.R_cam_head for camera in cameras]),
-        np.stack([camera.t_cam_head for camera in cameras]),
-        np.log([camera.focal_px for camera in cameras]),
-        points,
-        np.zeros(9),
-    )
+    focal = FocalGroups(np.arange(3), np.zeros(3), np.full(3, np.inf))
+    problem = posterior_of(scene, cameras, np.ones((3, 13)), focal=focal).problem
+    start = BundleState.of(cameras, points, focal.group, 9)
 
     def residuals(x):
-        bundle = move_bundle(start, (x[:30], x[30:].reshape(-1, 3)))
-        believed = scene.generic + np.tensordot(bundle.coefficients, scene.components, 1)
+        state = start.moved(x[:30], x[30:].reshape(-1, 3))
+        believed = scene.generic + np.tensordot(state.coefficients, scene.components, 1)
+        projected = problem.project(state, state.points).image_points
         return np.concatenate(
             [
-                bundle_residuals(bundle, data).ravel(),
-                ((bundle.points - believed) / 0.5).ravel(),
-                bundle.coefficients,
+                (projected - problem.image).ravel(),
+                ((state.points - believed) / 0.5).ravel(),
+                state.coefficients,
             ]
         )
 

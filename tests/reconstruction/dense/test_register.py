@@ -14,16 +14,16 @@ from mien.camera import Camera
 from mien.capture.source import CapturedView
 from mien.numeric.rotation import angle_between, rotation_from_vector
 from mien.numeric.similarity import estimate_similarity
-from mien.reconstruction.dense.joint import Lenses
+from mien.reconstruction.dense.joint import FocalGroups
 from mien.reconstruction.dense.register import Registration, register_views
 from mien.reconstruction.features import gather_features
 
 Photos = list[tuple[CapturedView, Camera]]
 
 
-def lenses(photos: Photos) -> Lenses:
+def lenses(photos: Photos) -> FocalGroups:
     focal = np.log([camera.focal_px for _, camera in photos])
-    return Lenses(np.arange(len(photos)), focal + 0.1, np.full(len(photos), 0.3))
+    return FocalGroups(np.arange(len(photos)), focal + 0.1, np.full(len(photos), 0.3))
 
 
 def turned(camera: Camera, k: int, degrees: float) -> Camera:

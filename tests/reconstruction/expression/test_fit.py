@@ -27,7 +27,7 @@ from marbled import GENERIC, Person, at
 from mien.arrays import Array
 from mien.camera import Camera
 from mien.capture.annotations import Annotations
-from mien.capture.faces.detector import NO_FACE
+from mien.capture.faces.detector import NO_FACE_FOUND
 from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
 from mien.capture.source import CapturedView
 from mien.errors import EstimationError
@@ -132,7 +132,7 @@ def test_a_photo_without_a_face_is_left_out_and_the_rest_comes_out_the_same() ->
     fit = fit_expression(
         [faceless, view], known_head(), progress=lambda done, total: told.append((done, total))
     )
-    assert fit.left_out == {"back.png": NO_FACE}
+    assert fit.left_out == {"back.png": NO_FACE_FOUND}
     assert list(fit.photos) == ["0.png"]
     for name in ("vertices", "units", "gaze"):
         same = getattr(fitted("one photo"), name)
@@ -146,7 +146,9 @@ def test_no_face_at_all() -> None:
         replace(view, landmarks=None, photo=replace(view.photo, name=name))
         for name in ("a.png", "b.png")
     ]
-    with pytest.raises(EstimationError, match=rf"^a\.png: {NO_FACE}; b\.png: {NO_FACE}"):
+    with pytest.raises(
+        EstimationError, match=rf"^a\.png: {NO_FACE_FOUND}; b\.png: {NO_FACE_FOUND}"
+    ):
         fit_expression(faceless, known_head())
 
 

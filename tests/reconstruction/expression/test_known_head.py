@@ -19,10 +19,10 @@ from mien.reconstruction.expression.known_head import (
     EXPRESSED_EDGE_MM,
     EXPRESSED_SKIN_MM,
     KnownHead,
-    feature_sightings,
+    feature_observations,
 )
 from mien.reconstruction.features import POINT_SIGMA_MM, gather_features
-from mien.reconstruction.observations import Sightings
+from mien.reconstruction.observations import SurfaceObservations
 
 OFF_MM = np.random.default_rng(2).normal(size=(478, 3))
 """By how much this detector means other places, on any head."""
@@ -42,13 +42,13 @@ def known_from(cameras: Sequence[Camera], confidence: Array | None = None) -> Kn
     return KnownHead(views, cameras, NEUTRAL, GENERIC.unit_offsets, GENERIC)
 
 
-def sightings_in(view: CapturedView, known: KnownHead) -> Sightings:
-    return feature_sightings(gather_features([view], GENERIC), known)
+def sightings_in(view: CapturedView, known: KnownHead) -> SurfaceObservations:
+    return feature_observations(gather_features([view], GENERIC), known)
 
 
-def off_px(seen: Sightings) -> Array:
+def off_px(seen: SurfaceObservations) -> Array:
     """(M,) how far the photo shows them off where they are expected on the true head."""
-    there = CAMERA.project(seen.on(TRUE) + seen.beside)
+    there = CAMERA.project(seen.on(TRUE) + seen.offset)
     return np.linalg.norm(there - seen.image_points, axis=1)
 
 
@@ -59,7 +59,7 @@ def share_believed(cameras: Sequence[Camera]) -> float:
     on_face = GENERIC.regions["face"][features.corners].max(axis=1) > 0
     numbers = np.array([int(name.split()[1]) for name in features.names])[on_face]
     edges = features.on_edges[on_face]
-    found = feature_sightings(features, known_from(cameras)).beside[edges]
+    found = feature_observations(features, known_from(cameras)).offset[edges]
     across = CAMERA.R_cam_head[:2]
     true = (OFF_MM[numbers][edges]) @ across.T
     return float(((found @ across.T) * true).sum() / (true**2).sum())
@@ -68,7 +68,7 @@ def share_believed(cameras: Sequence[Camera]) -> float:
 def test_what_neutral_photos_show_beside_its_place_is_there_in_the_expression() -> None:
     view = detected(CAMERA, TRUE)
     plain = sightings_in(view, known_head())
-    np.testing.assert_allclose(plain.beside, 0, atol=1e-9)
+    np.testing.assert_allclose(plain.offset, 0, atol=1e-9)
     corrected = sightings_in(view, known_from([at(yaw) for yaw in (-20, -10, 0, 10, 20)]))
     edges = corrected.sigma_mm == EXPRESSED_EDGE_MM
     assert np.median(off_px(corrected)[edges]) < 0.4 * np.median(off_px(plain)[edges])
@@ -87,12 +87,12 @@ def test_more_photos_are_believed_more() -> None:
 def test_a_detector_that_was_unsure_is_believed_less() -> None:
     view = detected(CAMERA, TRUE)
     sure, unsure = (
-        np.linalg.norm(sightings_in(view, known_from([at(0)], confidence)).beside, axis=1)
+        np.linalg.norm(sightings_in(view, known_from([at(0)], confidence)).offset, axis=1)
         for confidence in (np.ones(478), np.full(478, 0.3))
     )
     assert (unsure < 0.6 * sure).all()
     unseen = sightings_in(view, known_from([at(0)], np.zeros(478)))
-    np.testing.assert_array_equal(unseen.beside, 0)
+    np.testing.assert_array_equal(unseen.offset, 0)
 
 
 def test_how_far_sightings_are_trusted() -> None:
@@ -103,13 +103,13 @@ def test_how_far_sightings_are_trusted() -> None:
         annotations=Annotations(dict(zip(names, places, strict=True))),
     )
     features = gather_features([view], GENERIC)
-    seen = feature_sightings(features, known_from([at(0)]))
+    seen = feature_observations(features, known_from([at(0)]))
     on_face = GENERIC.regions["face"][features.corners].max(axis=1) > 0
     assert len(seen.photo) == (features.seen[0] & on_face).sum(), "irises turn by themselves"
     by_hand = seen.sigma_mm == POINT_SIGMA_MM
     assert by_hand.sum() == 2
     np.testing.assert_allclose(seen.image_points[by_hand], places)
-    np.testing.assert_array_equal(seen.beside[by_hand], 0)
+    np.testing.assert_array_equal(seen.offset[by_hand], 0)
     assert set(seen.sigma_mm[~by_hand]) == {EXPRESSED_EDGE_MM, EXPRESSED_SKIN_MM}
     np.testing.assert_array_equal(
         seen.sigma_mm[~by_hand] == EXPRESSED_EDGE_MM,
@@ -121,4 +121,4 @@ def test_photos_without_landmarks_say_nothing() -> None:
     known = known_head()
     silent = replace(known, views=[replace(view, landmarks=None) for view in known.views])
     seen = sightings_in(detected(CAMERA, TRUE), silent)
-    np.testing.assert_array_equal(seen.beside, 0)
+    np.testing.assert_array_equal(seen.offset, 0)

@@ -12,7 +12,7 @@ from marbled import GENERIC, Person, at, clutter
 from mien.arrays import Array
 from mien.reconstruction.expression.known_head import KnownHead
 from mien.reconstruction.expression.skin_tracking import MATCHED_SIGMA_MM, _nearest, follow_skin
-from mien.reconstruction.observations import Sightings
+from mien.reconstruction.observations import SurfaceObservations
 
 KNOWN = known_head(-25.0, 0.0, 25.0)
 CAMERA = at(6, -3)
@@ -20,13 +20,15 @@ TRUE = making(weights_of(mouthSmile=0.7, browInnerUp=0.6, jawOpen=0.3))
 VIEW = Person(TRUE, 1).seen_by(CAMERA)
 
 
-def followed(start: Array, *, mm_per_px: float = 0.8, known: KnownHead = KNOWN) -> Sightings:
+def followed(
+    start: Array, *, mm_per_px: float = 0.8, known: KnownHead = KNOWN
+) -> SurfaceObservations:
     found = follow_skin(VIEW, CAMERA, start, known, photo=3, mm_per_px=mm_per_px)
     assert found is not None
     return found
 
 
-def off_px(found: Sightings) -> Array:
+def off_px(found: SurfaceObservations) -> Array:
     return np.linalg.norm(CAMERA.project(found.on(TRUE)) - found.image_points, axis=1)
 
 
@@ -63,7 +65,7 @@ def test_only_skin_that_goes_with_the_head() -> None:
 def test_sightings_as_later_steps_want_them() -> None:
     found = followed(TRUE)
     assert (found.photo == 3).all()
-    np.testing.assert_array_equal(found.beside, 0)
+    np.testing.assert_array_equal(found.offset, 0)
     np.testing.assert_allclose(found.barycentrics.sum(axis=1), 1, atol=1e-5)
     assert (found.sigma_mm >= MATCHED_SIGMA_MM).all()
     # Evenly spread: none twice, none nearer to another than the grid says.

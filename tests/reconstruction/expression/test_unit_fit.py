@@ -23,9 +23,9 @@ from mien.arrays import Array
 from mien.camera import Camera
 from mien.numeric.rotation import angle_between, rotation_from_vector
 from mien.numeric.solvers.robust import loss_named
-from mien.reconstruction.expression.known_head import feature_sightings
+from mien.reconstruction.expression.known_head import feature_observations
 from mien.reconstruction.expression.unit_fit import MOST, UNIT_SD, Explained, explain
-from mien.reconstruction.observations import Sightings
+from mien.reconstruction.observations import SurfaceObservations
 
 KNOWN = known_head()
 NOTHING = np.zeros(52)
@@ -53,7 +53,7 @@ def astray(cameras: Sequence[Camera], *, focal: float = 1.0) -> Explained:
 
 
 def explained(
-    sightings: Sightings,
+    observations: SurfaceObservations,
     cameras: Sequence[Camera],
     *,
     start: Explained | None = None,
@@ -62,7 +62,7 @@ def explained(
     free: Array = STEADY,
 ) -> Explained:
     focal = np.full(len(cameras), focal_sd)
-    return explain(sightings, start or astray(cameras), expected, focal, KNOWN, free=free)
+    return explain(observations, start or astray(cameras), expected, focal, KNOWN, free=free)
 
 
 def check_cameras(found: Explained, true: Sequence[Camera], *, degrees: float, mm: float) -> None:
@@ -83,7 +83,7 @@ def test_skin_that_is_seen_exactly_tells_cameras_and_units(cameras: list[Camera]
 @pytest.mark.parametrize("cameras", [ONE, TWO])
 def test_exact_landmarks_tell_most_of_it(cameras: list[Camera]) -> None:
     """They are believed to be 0.8 to 2.5 mm off, so that units are pulled a little to rest."""
-    landmarks = feature_sightings(features_of(TRUE, cameras), KNOWN)
+    landmarks = feature_observations(features_of(TRUE, cameras), KNOWN)
     found = explained(landmarks, cameras)
     check_cameras(found, cameras, degrees=0.1, mm=0.5)
     np.testing.assert_allclose(found.weights, WEIGHTS, atol=0.1)
@@ -91,7 +91,7 @@ def test_exact_landmarks_tell_most_of_it(cameras: list[Camera]) -> None:
 
 
 def test_what_is_expected_and_seen_is_found_exactly() -> None:
-    landmarks = feature_sightings(features_of(TRUE, ONE), KNOWN)
+    landmarks = feature_observations(features_of(TRUE, ONE), KNOWN)
     found = explained(landmarks, ONE, expected=WEIGHTS)
     check_cameras(found, ONE, degrees=1e-3, mm=1e-2)
     np.testing.assert_allclose(found.weights, WEIGHTS, atol=1e-4)
@@ -147,9 +147,9 @@ def test_a_lens_that_is_known_stays() -> None:
 def test_a_place_that_lies_beside_its_attachment() -> None:
     """A landmark that means another place than the one it is attached to, and is known to."""
     seen = skin_seen(TRUE, ONE, count=800)
-    beside = np.random.default_rng(0).normal(size=seen.beside.shape)
-    places = seen.on(TRUE) + beside
-    found = explained(replace(seen, beside=beside, image_points=ONE[0].project(places)), ONE)
+    offset = np.random.default_rng(0).normal(size=seen.offset.shape)
+    places = seen.on(TRUE) + offset
+    found = explained(replace(seen, offset=offset, image_points=ONE[0].project(places)), ONE)
     check_cameras(found, ONE, degrees=0.01, mm=0.1)
     np.testing.assert_allclose(found.weights, WEIGHTS, atol=0.01)
 
@@ -164,11 +164,11 @@ def test_wild_sightings_change_little() -> None:
 
 
 def cost(
-    state: Explained, seen: Sightings, start: Explained, expected: Array, focal_sd: float
+    state: Explained, seen: SurfaceObservations, start: Explained, expected: Array, focal_sd: float
 ) -> float:
     """What explain says it minimizes, written out."""
     total = float((((state.weights - expected) / UNIT_SD)[STEADY] ** 2).sum())
-    places = seen.on(state.vertices(KNOWN)) + seen.beside
+    places = seen.on(state.vertices(KNOWN)) + seen.offset
     for k, (item, before) in enumerate(zip(state.cameras, start.cameras, strict=True)):
         mine = seen.photo == k
         off = item.project(places[mine]) - seen.image_points[mine]
@@ -179,7 +179,7 @@ def cost(
 
 
 def test_every_nudge_of_the_answer_costs(rng: np.random.Generator) -> None:
-    seen = feature_sightings(features_of(TRUE, TWO), KNOWN)
+    seen = feature_observations(features_of(TRUE, TWO), KNOWN)
     noisy = seen.image_points + rng.normal(size=seen.image_points.shape)
     seen = replace(seen, image_points=noisy)
     start, expected = astray(TWO), weights_of(mouthSmile=0.5)

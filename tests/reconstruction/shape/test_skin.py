@@ -11,7 +11,7 @@ from expressive import FACE, NEUTRAL, SKIN, bump, making, skin_seen, vertices_se
 from marbled import GENERIC, at
 from mien.arrays import Array
 from mien.numeric.solvers.robust import loss_named
-from mien.reconstruction.observations import Sightings
+from mien.reconstruction.observations import SurfaceObservations
 from mien.reconstruction.shape.skin import BENDING, REACH_MM, _stiffness, move_skin
 
 CAMERAS = [at(-20, 4), at(20, -4)]
@@ -41,16 +41,18 @@ def moved() -> Array:
 
 
 @pytest.fixture(scope="module")
-def seen(moved: Array) -> Sightings:
+def seen(moved: Array) -> SurfaceObservations:
     return skin_seen(moved, CAMERAS, count=1200)
 
 
 @pytest.fixture(scope="module")
-def found(seen: Sightings) -> Array:
+def found(seen: SurfaceObservations) -> Array:
     return move_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE)
 
 
-def test_skin_goes_where_two_photos_show_it(moved: Array, seen: Sightings, found: Array) -> None:
+def test_skin_goes_where_two_photos_show_it(
+    moved: Array, seen: SurfaceObservations, found: Array
+) -> None:
     assert np.linalg.norm(seen.on(moved) - seen.on(NEUTRAL), axis=1).max() > 3
     off = np.linalg.norm(seen.on(found) - seen.on(moved), axis=1)
     assert np.median(off) < 0.02
@@ -73,17 +75,17 @@ def test_what_is_seen_where_it_is_does_not_move() -> None:
 
 def test_without_sightings_nothing_moves() -> None:
     seen = skin_seen(NEUTRAL, CAMERAS, count=3)
-    nothing = Sightings(*(getattr(seen, field.name)[:0] for field in fields(seen)))
+    nothing = SurfaceObservations(*(getattr(seen, field.name)[:0] for field in fields(seen)))
     still = move_skin(NEUTRAL, nothing, CAMERAS, GENERIC, held=NOWHERE)
     np.testing.assert_allclose(still, NEUTRAL, atol=1e-9)
 
 
-def cost(vertices: Array, seen: Sightings, across_sd_mm: float | None) -> float:
+def cost(vertices: Array, seen: SurfaceObservations, across_sd_mm: float | None) -> float:
     """What move_skin says it minimizes: the distances written out, the bending its own."""
     total = 0.0
     for k, item in enumerate(CAMERAS):
         mine = seen.photo == k
-        off = item.project((seen.on(vertices) + seen.beside)[mine]) - seen.image_points[mine]
+        off = item.project((seen.on(vertices) + seen.offset)[mine]) - seen.image_points[mine]
         sigma = seen.sigma_mm[mine] * item.focal_px / item.t_cam_head[2]
         total += loss_named("cauchy")((off**2).sum(axis=1) / sigma**2)[0].sum()
     moves = (vertices - NEUTRAL)[SKIN].ravel()
@@ -92,7 +94,7 @@ def cost(vertices: Array, seen: Sightings, across_sd_mm: float | None) -> float:
 
 @pytest.mark.parametrize("across_sd_mm", [None, 0.3])
 def test_every_nudge_of_the_answer_costs(
-    seen: Sightings, rng: np.random.Generator, across_sd_mm: float | None
+    seen: SurfaceObservations, rng: np.random.Generator, across_sd_mm: float | None
 ) -> None:
     best = move_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE, across_sd_mm=across_sd_mm)
     least = cost(best, seen, across_sd_mm)
@@ -186,10 +188,12 @@ def test_lips_that_touch_part() -> None:
     np.testing.assert_allclose(moves[LOWER, 1], -1, atol=0.1)
 
 
-def test_a_wild_sighting_counts_little(moved: Array, seen: Sightings, found: Array) -> None:
+def test_a_wild_sighting_counts_little(
+    moved: Array, seen: SurfaceObservations, found: Array
+) -> None:
     wrong = seen.image_points.copy()
     wrong[::20] += [40, -30]
-    spoilt = Sightings(
+    spoilt = SurfaceObservations(
         **{field.name: getattr(seen, field.name) for field in fields(seen)}
         | {"image_points": wrong}
     )

@@ -7,7 +7,7 @@ import pytest
 
 from mien.animate.from_track import FACING
 from mien.numeric.rotation import rotation_from_vector
-from mien.report.page import head_angles
+from mien.report.page import head_angles_deg
 from mien.report.track.series import (
     quaternions,
     rotation_errors,
@@ -37,7 +37,7 @@ def test_every_number_is_there(track: Track) -> None:
         assert (series.rms[row], series.seen[row]) == (found.rms, found.seen)
         np.testing.assert_array_equal(series.rotations[row], found.state.R_cam_head)
         np.testing.assert_array_equal(series.translations[row], found.state.t_cam_head)
-        np.testing.assert_allclose(series.angles[row], head_angles(track.camera(found.state)))
+        np.testing.assert_allclose(series.angles[row], head_angles_deg(track.camera(found.state)))
         for column, name in enumerate(LAYOUT.channels):
             assert series.values[name][row] == found.state.values[column]
             assert series.deviations[name][row] == found.deviations[column]

@@ -139,7 +139,7 @@ def test_points_do_not_jump(layout, points):
 
 
 def test_landmarks_and_outside(layout, points):
-    landmarks = np.linalg.lstsq(layout.mixes, points, rcond=None)[0]
+    landmarks = np.linalg.lstsq(layout.landmark_weights, points, rcond=None)[0]
     true = raised(layout, points, "left", 0.06, 0.06)
     found = detected_points(layout, painted(layout, true), landmarks)
     assert np.linalg.norm(found - true, axis=1)[rows_of(layout, "left")].max() < 0.015 * WIDTH

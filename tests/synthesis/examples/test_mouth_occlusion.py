@@ -28,7 +28,7 @@ def face(layout, *, hand=False):
     if hand:
         corner = np.rint(points[layout.index("right_mouth_corner")]).astype(int)
         cv2.circle(picture, corner.tolist(), 40, HAND, -1)
-    landmarks = np.linalg.lstsq(layout.mixes, points, rcond=None)[0]
+    landmarks = np.linalg.lstsq(layout.landmark_weights, points, rcond=None)[0]
     return picture, landmarks
 
 

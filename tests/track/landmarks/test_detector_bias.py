@@ -8,8 +8,9 @@ import pytest
 import posable
 from marked import FOCAL, FRONT, SIZE, Shown
 from mien.arrays import Array
+from mien.assets.landmark_sets import LANDMARK_COUNT
 from mien.camera import Camera
-from mien.capture.faces.mediapipe_face import LANDMARK_COUNT, DetectedFace
+from mien.capture.faces.mediapipe_face import DetectedFace
 from mien.numeric.rotation import rotation_from_vector
 from mien.rig.rig import Rig
 from mien.rig.state import FaceState

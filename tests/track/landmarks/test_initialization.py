@@ -9,8 +9,9 @@ import pytest
 
 import posable
 from marked import FOCAL, LAYOUT, SIZE, Blind, Shown, face_of, posed, prepared, starter
+from mien.assets.landmark_sets import LANDMARK_COUNT
 from mien.camera import Camera
-from mien.capture.faces.mediapipe_face import LANDMARK_COUNT, DetectedFace
+from mien.capture.faces.mediapipe_face import DetectedFace
 from mien.errors import InputError
 from mien.numeric.rotation import angle_between, rotation_from_vector
 from mien.track.landmarks.fit import Guess, MarkProblem, Observation, bounded_step

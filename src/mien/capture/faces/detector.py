@@ -21,10 +21,10 @@ MIN_EYE_DISTANCE_PX = 20.0
 GOOD_EYE_DISTANCE_PX = 60.0
 """From here on they are good to 1 % of it; more pixels add little."""
 
-SMALL = 0.15
+SMALL_FACE = 0.15
 """A face narrower than this share of a frame's longer side is looked at again from near by."""
 
-NO_FACE = (
+NO_FACE_FOUND = (
     "no face found; one must look within about 50 degrees of the camera and fill a twentieth of "
     "the photo's width"
 )
@@ -85,7 +85,7 @@ class LandmarkDetector:
             raise InputError("face", "a number from 1 on", face)
         sight = self._best_sight(photo, face)
         if sight is None:
-            raise NoFaceError(f"{photo.name}: {NO_FACE}")
+            raise NoFaceError(f"{photo.name}: {NO_FACE_FOUND}")
         return _landmarks(photo, sight)
 
     def detect_fast(self, pixels: UInt8[Array, "h w 3"]) -> DetectedFace | None:
@@ -162,7 +162,7 @@ def closer(
     detector: LandmarkDetector, pixels: UInt8[Array, "h w 3"], found: DetectedFace
 ) -> DetectedFace:
     """A face found in a frame; one that is small is looked at again from near by."""
-    if found.width > SMALL * max(pixels.shape[:2]):
+    if found.width > SMALL_FACE * max(pixels.shape[:2]):
         return found
     return _from_near_by(detector, pixels, found) or found
 

@@ -25,7 +25,7 @@ from mien.capture.video.orientation import turn_upright
 from mien.capture.video.video import Video
 from mien.errors import EstimationError, InputError
 from mien.progress import StepProgress
-from mien.reading.names import plain_name
+from mien.reading.names import portable_name
 
 __all__ = ["FaceSeries", "PictureCallback", "find_faces", "load_pictures", "row_of", "rows_of"]
 
@@ -161,7 +161,7 @@ class _Gathered:
                     self._add(frame_name(picture.frame), picture.frame, picture.pixels, found)
                 if report is not None:
                     report(picture.frame + 1, max(total, picture.frame + 1))
-        name = plain_name(self.source)
+        name = portable_name(self.source)
         self.notes += [f"{name}: {note}" for note in (*video.notes, *odd.notes)]
 
     def read_photos(
@@ -175,7 +175,9 @@ class _Gathered:
         for folder, paths in folders.items():
             self.notes += orphaned_annotations(paths)
             for path in paths:
-                name = plain_name(path) if len(folders) == 1 else f"{folder}/{plain_name(path)}"
+                name = (
+                    portable_name(path) if len(folders) == 1 else f"{folder}/{portable_name(path)}"
+                )
                 self._add_photo(name, number, path, detector, face)
                 number += 1
                 if report is not None:

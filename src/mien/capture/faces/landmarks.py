@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int, check_array, check_rotation, frozen
-from mien.capture.faces.mediapipe_face import LANDMARK_COUNT, LEFT_IRIS, RIGHT_IRIS, DetectedFace
+from mien.assets.landmark_sets import LANDMARK_COUNT
+from mien.capture.faces.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace
 
 CUT_SHARE = 0.02
 """Of the face's width: how far over the edge of the picture a point may lie before the edge is said

@@ -18,7 +18,6 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.errors import MienError
 
-LANDMARK_COUNT = 478
 RIGHT_IRIS, LEFT_IRIS = 468, 473
 UPPER_LIP, LOWER_LIP = 13, 14
 MAX_FACES = 8

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mien.capture.images.unsupported import unread_kind
-from mien.errors import FileFormatError, InputError
-from mien.reading.names import check_readable, kind_of, one_line
+from mien.errors import FileFormatError, InputError, one_line
+from mien.reading.files import check_readable, describe_content
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -34,7 +34,7 @@ FORMATS = (
 """Pillow's names of what is read. Pillow knows more kinds, and for some of them, as PostScript, it
 starts a program that runs what the file says."""
 
-EXPECTED = "an image (JPEG, PNG, HEIC, ...)"
+_EXPECTED = "an image (JPEG, PNG, HEIC, ...)"
 
 
 class UnreadSamplesError(ValueError):
@@ -74,8 +74,8 @@ def opened_image(path: str | Path, notes: list[str], *, kind: str = "a photo") -
         except Image.DecompressionBombError:
             raise _too_large(path, "more") from None
         except UnidentifiedImageError:
-            found = unread_kind(path) or kind_of(path)
-            raise FileFormatError(path, f"expected {EXPECTED}, found {found}") from None
+            found = unread_kind(path) or describe_content(path)
+            raise FileFormatError(path, f"expected {_EXPECTED}, found {found}") from None
         except UnreadSamplesError as error:
             raise FileFormatError(path, f"expected 8 or 16 bits a sample, found {error}") from None
         except Exception as error:
@@ -92,7 +92,7 @@ def is_image(path: Path) -> bool:
             moves = image.format in ("GIF", "PNG") and getattr(image, "n_frames", 1) > 1
             return not moves
     except FileFormatError as error:
-        return EXPECTED not in error.problem
+        return _EXPECTED not in error.problem
     except InputError:
         return False
 

@@ -11,7 +11,7 @@ import numpy as np
 from mien.arrays import Array, UInt8, check_image, check_positive, frozen
 from mien.capture.images.exif import focal_prior_px, orientation
 from mien.capture.images.opening import opened_image
-from mien.reading.names import named_path, plain_name
+from mien.reading.names import check_path, portable_name
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -83,7 +83,7 @@ def load_photo(path: str | Path, *, max_side: int = DEFAULT_MAX_SIDE) -> Photo:
         InputError: there is no such file, it may not be read, `max_side` is not positive.
         FileFormatError: not an image, empty, damaged, too large, of an unsupported sample type.
     """
-    path = named_path("photo", path, "a photo")
+    path = check_path("photo", path, "a photo")
     check_positive("max_side", max_side)
     notes: list[str] = []
     with opened_image(path, notes) as image:
@@ -101,7 +101,7 @@ def load_photo(path: str | Path, *, max_side: int = DEFAULT_MAX_SIDE) -> Photo:
     if scale < 1:
         notes.append(f"scaled from {original[0]}x{original[1]} to {upright.width}x{upright.height}")
     focal = None if focal_per_px is None else focal_per_px * scale
-    return Photo(plain_name(path), path, pixels, focal, original, tuple(notes))
+    return Photo(portable_name(path), path, pixels, focal, original, tuple(notes))
 
 
 def shrunk(pixels: UInt8[Array, "h w 3"], side: int) -> UInt8[Array, "h w 3"]:

@@ -8,9 +8,9 @@ from mien.arrays import Array, Float, Int
 from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
 from mien.capture.video.frame_selection import FrameScores, expression_distance, sharp_rows
 
-DIFFERENT = 0.55
+MIN_DISTANCE = 0.55
 """Scores that two expressions of one person differ by at least."""
-MOST = 8
+MAX_EXPRESSIONS = 8
 """As many expressions besides neutral are picked unless a number is asked for."""
 _NEAR = 0.25
 """Frames this near to the one that was sought show the same expression: the sharpest will do."""
@@ -66,12 +66,12 @@ def choose_expressions(
     rows = sharp_rows(scores, np.flatnonzero(np.abs(scores.pose[:, 0]) <= _MAX_YAW))
     distance = expression_distance(scores.blendshapes, neutral)
     chosen: list[int] = []
-    while len(rows) and len(chosen) < (MOST if count is None else count):
+    while len(rows) and len(chosen) < (MAX_EXPRESSIONS if count is None else count):
         farthest = int(rows[distance[rows].argmax()])
-        if distance[farthest] < DIFFERENT:
+        if distance[farthest] < MIN_DISTANCE:
             break
         away = expression_distance(scores.blendshapes, farthest)
-        near = rows[(away[rows] <= _NEAR) & (distance[rows] >= DIFFERENT)]
+        near = rows[(away[rows] <= _NEAR) & (distance[rows] >= MIN_DISTANCE)]
         best = int(near[scores.sharpness[near].argmax()])
         chosen.append(best)
         distance = np.minimum(distance, expression_distance(scores.blendshapes, best))

@@ -11,7 +11,6 @@ from mien.arrays import Array, Int, check_positive
 from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.faces.mediapipe_face import DetectedFace
 from mien.capture.faces.sharpness import face_sharpness
-from mien.capture.folder import NEUTRAL
 from mien.capture.images.photos import DEFAULT_MAX_SIDE, Photo, shrunk
 from mien.capture.video.clip_notes import ClipNotes
 from mien.capture.video.expression_selection import choose_expressions, name_expressions
@@ -20,6 +19,7 @@ from mien.capture.video.frame_selection import FrameScores, choose_frames
 from mien.capture.video.orientation import turn_upright
 from mien.capture.video.video import Video
 from mien.errors import EstimationError
+from mien.head import NEUTRAL
 from mien.progress import StepProgress
 
 MAX_SAMPLES = 240

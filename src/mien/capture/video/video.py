@@ -14,8 +14,8 @@ from mien.arrays import Array, UInt8, UInt16
 from mien.capture.images.hdr import HDR, to_srgb
 from mien.capture.images.opening import MAX_PIXELS, is_image
 from mien.capture.video.display_matrix import Display, display_of
-from mien.errors import FileFormatError
-from mien.reading.names import check_readable, kind_of, one_line
+from mien.errors import FileFormatError, one_line
+from mien.reading.files import check_readable, describe_content
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -217,7 +217,7 @@ def _open(path: Path) -> InputContainer:
         return av.open(f"file:{path}", container_options=_OPTIONS, **lenient)  # type: ignore[call-overload]
     except av.FFmpegError as error:
         reason = one_line(error.strerror or error)
-        found = "a photo" if is_image(path) else f"{kind_of(path)} ({reason})"
+        found = "a photo" if is_image(path) else f"{describe_content(path)} ({reason})"
         raise FileFormatError(path, f"expected a video, found {found}") from None
 
 

@@ -29,7 +29,7 @@ from mien.io.files.atomic import atomic_folder, check_folder_place
 from mien.io.files.image import encode_image, load_image
 from mien.io.files.leftovers import finish_replacement
 from mien.numeric.kernels.threads import run_concurrently
-from mien.reading.names import is_inside, named_path
+from mien.reading.names import check_path, is_inside
 from mien.reading.npz import ArrayFile
 from mien.reading.strict_json import as_list, as_object, as_text, errors_name_file, need, read_json
 from mien.synthesis.composition.example_warping import aligned_photos
@@ -122,7 +122,7 @@ def load_examples(folder: str | Path, *, layout: FeatureLayout | None = None) ->
         FileFormatError: something in it is missing, damaged, of another layout or newer than this
             program; the message names the file and the place in it.
     """
-    folder = named_path("examples", folder, "an example folder that `mien examples` made")
+    folder = check_path("examples", folder, "an example folder that `mien examples` made")
     layout = layout or load_feature_layout()
     path, data = _read_index(folder)
     try:

@@ -23,7 +23,7 @@ from mien.io.files.manifest import (
     load_manifest,
     save_manifest,
 )
-from mien.reading.names import named_path
+from mien.reading.names import check_path
 
 # Failures of the place that is written to; others are the caller's and pass through.
 _PLACE_ERRORS = {
@@ -239,7 +239,7 @@ def _swap(new: Path, target: Path, before: Snapshot | None) -> None:
 
 def _target(path: str | Path) -> Path:
     """Where a link leads: the link stays and what it names is replaced."""
-    return Path(os.path.realpath(named_path("output", path, "where a result goes")))
+    return Path(os.path.realpath(check_path("output", path, "where a result goes")))
 
 
 def _is_same(one: Path, other: Path) -> bool:

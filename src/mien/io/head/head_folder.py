@@ -33,7 +33,7 @@ from mien.io.head.head_json import (
 )
 from mien.io.head.region_masks import MASK_FILES, load_masks, save_masks
 from mien.limits import MAX_SIDE
-from mien.reading.names import is_inside, named_path
+from mien.reading.names import check_path, is_inside
 from mien.reading.strict_json import as_names, as_object, as_text, join, need, read_json
 
 HEAD, GEOMETRY = "head.json", "geometry.npz"
@@ -119,7 +119,7 @@ def load_head(folder: str | Path) -> Head:
         FileFormatError: something in it is missing, damaged or newer than this program; the message
             names the file and the place in it.
     """
-    folder = named_path("head", folder, "a head folder that `mien build` made")
+    folder = check_path("head", folder, "a head folder that `mien build` made")
     if not folder.is_dir():
         finish_replacement(folder)
     if not folder.is_dir():

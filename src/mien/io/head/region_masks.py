@@ -11,7 +11,7 @@ from mien.io.files.image import encode_image, load_image
 from mien.mesh import Mesh
 from mien.rig.regions import MASKS
 from mien.texture.atlas import atlas_surface, fill_gutters
-from mien.texture.surface import over_vertices
+from mien.texture.surface import interpolate_vertex_values
 
 FOLDER = "regions"
 MASK_FILES = frozenset(f"{FOLDER}/{name}.png" for name in MASKS)
@@ -24,7 +24,7 @@ def save_masks(folder: Path, mesh: Mesh, masks: dict[str, Float[Array, " v"]]) -
     if not masks:
         return
     surface = atlas_surface(mesh, width=_SIDE, height=_SIDE)
-    values = over_vertices(surface, mesh, np.stack(list(masks.values()), axis=1))
+    values = interpolate_vertex_values(surface, mesh, np.stack(list(masks.values()), axis=1))
     values = fill_gutters(values, surface.mask)
     (folder / FOLDER).mkdir()
     for name, image in zip(masks, np.moveaxis(values, -1, 0), strict=True):

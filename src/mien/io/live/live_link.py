@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mien.animate.channels import head_angles
+from mien.animate.channels import head_angles_rad
 from mien.animate.timeline import Moment
 from mien.arrays import Array
 from mien.errors import InputError
@@ -65,7 +65,7 @@ def live_link_values(moment: Moment, given: Mapping[str, float]) -> dict[str, fl
         InputError: a unit that the format does not have.
     """
     weights = weights_with_gaze(moment.state, given)
-    yaw, pitch, roll = head_angles(moment.rotation, order="YXZ")
+    yaw, pitch, roll = head_angles_rad(moment.rotation, order="YXZ")
     angles = [-yaw, pitch, -roll, *_eye_angles(weights)]
     return weights | dict(zip((*HEAD_COLUMNS, *EYE_COLUMNS), angles, strict=True))
 

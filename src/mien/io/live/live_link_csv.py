@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mien.animate.channels import head_angles
+from mien.animate.channels import head_angles_rad
 from mien.animate.curves import MIN_STEP, Curve, sampled
 from mien.animate.timeline import Moment, Timeline
 from mien.arrays import Array, Float
@@ -280,7 +280,7 @@ def _head_tracks(times: Array, angles: Sequence[Array | None]) -> dict[str, Curv
         return {}
     yaw_pitch_roll = np.column_stack([-given[0], given[1], -given[2]])
     rotations = Rotation.from_euler("YXZ", yaw_pitch_roll).as_matrix()
-    unwrapped = np.unwrap(np.array([head_angles(rotation) for rotation in rotations]), axis=0)
+    unwrapped = np.unwrap(np.array([head_angles_rad(rotation) for rotation in rotations]), axis=0)
     return {
         f"head.{name}": sampled(times, unwrapped[:, index])
         for index, name in enumerate(("yaw", "pitch", "roll"))

@@ -18,7 +18,7 @@ from tempfile import TemporaryFile
 
 import numpy as np
 
-from mien.animate.channels import head_angles
+from mien.animate.channels import head_angles_rad
 from mien.arrays import Array, Float, Int, check_array, check_rotation, frozen
 from mien.assets.generic import load_generic_head
 from mien.errors import EstimationError, InputError, escaped
@@ -131,12 +131,12 @@ class FapMeter:
             values[item.number] = max(0.0, value) if item.one_way else value
         for index, side in enumerate(EYEBALLS):
             at_rest, now = _eyeball(self.neutral, side), _eyeball(vertices, side)
-            yaw, pitch, _ = head_angles(_turn(at_rest, now), order="YXZ")
+            yaw, pitch, _ = head_angles_rad(_turn(at_rest, now), order="YXZ")
             values[[EYE_YAW[index], EYE_PITCH[index]]] = np.array([yaw, pitch]) / ANGLE_UNIT
             thrust = now.mean(axis=0)[2] - at_rest.mean(axis=0)[2]
             values[EYE_THRUST[index]] = 1024 * thrust / self.fapu.ES
         if rotation is not None:
-            yaw, pitch, roll = head_angles(check_rotation("rotation", rotation), order="YXZ")
+            yaw, pitch, roll = head_angles_rad(check_rotation("rotation", rotation), order="YXZ")
             head = [HEAD_YAW, HEAD_PITCH, HEAD_ROLL]
             values[head] = np.array([yaw, pitch, roll]) / ANGLE_UNIT
         return np.round(values[1:]).astype(np.int64)

@@ -21,7 +21,7 @@ from mien.arrays import Array, Float
 from mien.errors import DocumentError, FileFormatError, InputError
 from mien.io.files.atomic import atomic_file
 from mien.limits import MAX_LINE, MAX_TABLE_BYTES
-from mien.reading.files import check_file
+from mien.reading.files import check_size
 from mien.reading.strict_json import (
     DocumentFormat,
     as_choice,
@@ -144,7 +144,7 @@ def load_journal(
         FileFormatError: no journal, a newer version; a line that holds no frame, or another one
             than that which follows.
     """
-    path = check_file(path, MAX_TABLE_BYTES)
+    path = check_size(path, MAX_TABLE_BYTES)
     frames: list[TrackedFrame] = []
     try:
         with path.open("rb") as file:

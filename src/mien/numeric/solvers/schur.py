@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -43,14 +44,49 @@ class BlockSystem:
         common, blocks = self.common.copy(), self.blocks.copy()
         np.einsum("ii->i", common)[:] += common_extra
         np.einsum("nii->ni", blocks)[:] += block_extra
-        reduced, eliminated = _reduced(common, np.linalg.inv(blocks), self.coupling)
-        right = -self.common_gradient + np.einsum("ndb,nb->d", eliminated, self.block_gradient)
-        step = _solve_positive(reduced, right)
-        inner = -self.block_gradient - np.einsum("ndb,d->nb", self.coupling, step)
-        block_step = np.linalg.solve(blocks, inner[..., None])[..., 0]
+        damped = replace(self, common=common, blocks=blocks)
+        step = _solve_positive(*damped.reduced())
+        block_step = damped.block_step(step)
         fall = step @ (common_extra * step - self.common_gradient)
         fall += (block_step * (block_extra * block_step - self.block_gradient)).sum()
         return step, block_step, 0.5 * float(fall)
+
+    def reduced(self) -> tuple[Float[Array, "d d"], Float[Array, " d"]]:
+        """The Schur complement of the blocks, and the right side: equations of the common part."""
+        coupling, gradient = self._whitened
+        return (
+            self.common - coupling.T @ coupling,
+            coupling.T @ gradient - self.common_gradient,
+        )
+
+    def eliminate(
+        self,
+        matrix: Float[Array, "a d"],
+        coupling: Float[Array, "n a b"],
+        right: Float[Array, " a"],
+    ) -> tuple[Float[Array, "a d"], Float[Array, " a"]]:
+        """Equations matrix @ common + sum coupling_n @ block_n = right without the blocks."""
+        own = _flat(self._inverse_root @ np.swapaxes(coupling, 1, 2))
+        common, gradient = self._whitened
+        return matrix - own.T @ common, right + own.T @ gradient
+
+    def block_step(self, common: Float[Array, " d"]) -> Float[Array, "n b"]:
+        """(N, B) steps of the blocks that go with a step of the common unknowns."""
+        coupling, gradient = self._whitened
+        whitened = (gradient + coupling @ common).reshape(self.block_gradient.shape)
+        return -np.einsum("nij,ni->nj", self._inverse_root, whitened)
+
+    @cached_property
+    def _inverse_root(self) -> Float[Array, "n b b"]:
+        """Inverses of the blocks' Cholesky factors."""
+        return np.linalg.inv(np.linalg.cholesky(self.blocks))
+
+    @cached_property
+    def _whitened(self) -> tuple[Float[Array, "n*b d"], Float[Array, " n*b"]]:
+        """Coupling and block gradient in units in which every block is the identity."""
+        coupling = self._inverse_root @ np.swapaxes(self.coupling, 1, 2)
+        gradient = np.einsum("nij,nj->ni", self._inverse_root, self.block_gradient)
+        return _flat(coupling), gradient.ravel()
 
     def covariance(
         self, constraints: Float[Array, "n q b"] | None = None
@@ -76,9 +112,10 @@ class BlockSystem:
             common = np.pad(common, (0, count))
             held = np.where(is_open[:, None, None], 0.0, constraints)
             coupling = np.concatenate([coupling, held], axis=1)
-        reduced, eliminated = _reduced(common, own, coupling)
+        response = own @ np.swapaxes(coupling, 1, 2)
+        reduced = common - _flat(np.swapaxes(coupling, 1, 2)).T @ _flat(response)
         inverse = _inverse(reduced)
-        covariances = own + np.swapaxes(eliminated, 1, 2) @ inverse @ eliminated
+        covariances = own + response @ inverse @ np.swapaxes(response, 1, 2)
         size = len(self.common)
         return inverse[:size, :size], np.where(is_open[:, None, None], np.inf, covariances)
 
@@ -95,13 +132,9 @@ def _diagonal(matrices: Array) -> Array:
     return np.maximum(diagonal, floor)
 
 
-def _reduced(common: Array, inverse: Array, coupling: Array) -> tuple[Array, Array]:
-    """The Schur complement of the blocks, given their inverses, and coupling @ inverse."""
-    eliminated: Array = coupling @ inverse
-    size = len(common)
-    flat = np.swapaxes(eliminated, 0, 1).reshape(size, -1)
-    reduced = common - flat @ np.swapaxes(coupling, 0, 1).reshape(size, -1).T
-    return reduced, eliminated
+def _flat(coupling: Float[Array, "n b d"]) -> Float[Array, "n*b d"]:
+    """As one matrix, so that a sum over blocks is one product."""
+    return coupling.reshape(-1, coupling.shape[2])
 
 
 def _solve_positive(matrix: Array, right: Array) -> Array:

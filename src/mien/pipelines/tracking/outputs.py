@@ -21,7 +21,7 @@ from mien.io.tracks.track_journal import journal_of
 from mien.io.tracks.track_json import sidecar_of
 from mien.pipelines.explained import units_of
 from mien.progress import Progress
-from mien.reading.names import plain_name
+from mien.reading.names import portable_name
 from mien.track.state import Track
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ class TrackFiles:
             write_track_plots(
                 self.plots,
                 track,
-                title=plain_name(video.path),
+                title=portable_name(video.path),
                 video=video,
                 head=renderer,
                 progress=partial(tell, PLOTS),

@@ -20,7 +20,7 @@ from mien.io.tracks.track_journal import Journal, journal_of, load_journal
 from mien.limits import MAX_FPS
 from mien.pipelines.tracking.ready_head import ReadyHead
 from mien.progress import Progress
-from mien.reading.names import plain_name
+from mien.reading.names import portable_name
 from mien.track.state import Layout, Track, TrackedFrame
 
 TRACKING = "Tracking"
@@ -79,7 +79,7 @@ class TrackRun:
         path = self.clip.path
         return {
             "generator": f"mien {version('mien')}",
-            "video": {"name": plain_name(path), "bytes": path.stat().st_size},
+            "video": {"name": portable_name(path), "bytes": path.stat().st_size},
             "head": digest(self.ready.head),
             "focal_px": self.focal_px,
             "max_side": self.max_side,

@@ -1,62 +1,145 @@
-"""The bundle adjustment problem: unknowns, residuals, their derivatives and normal equations."""
+"""The bundle adjustment problem: unknowns, observations, priors and normal equations.
+
+Unknown are K cameras with G focal lengths, the coefficients c of a linear shape model, and N points
+
+    X_n = mean_n + sum_i c_i B_in + d_n
+
+whose deviations d_n from the model have a Gaussian prior of precision P_n. Two solvers share this
+problem: bundle.adjustment minimizes a cost, dense.joint solves equations with instruments.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int
-from mien.numeric.rotation import cross_matrix, rotation_from_vector
-from mien.numeric.solvers.robust import Loss
+from mien.camera import Camera
+from mien.numeric.rotation import rotation_from_vector, rotation_to_vector
+from mien.numeric.segment_sum import SegmentSum
 from mien.numeric.solvers.schur import BlockSystem
-from mien.reconstruction.bundle.marginal_likelihood import point_evidence
+from mien.reconstruction.bundle.projection import (
+    CAMERA_SIZE,
+    POSE_SIZE,
+    PinholeArrays,
+    Projection,
+    Reprojection,
+    project_points,
+)
 
-__all__ = [
-    "POSE_SIZE",
-    "Bundle",
-    "BundleData",
-    "ShapePrior",
-    "bundle_cost",
-    "bundle_jacobians",
-    "bundle_residuals",
-    "linearize_bundle",
-    "move_bundle",
-    "similarity_constraints",
-]
-
-POSE_SIZE = 6
-"""Unknowns of a photo's step: rotation vector, shift in x and y (mm), log depth."""
+_MAX_LOG_STEP = 3.0
+"""Of a depth or focal length."""
 
 
 @dataclass(frozen=True)
-class ShapePrior:
-    """What is known of the shape beforehand: m_i = mean_i + sum_c c B_ci + d_i.
+class Observations:
+    """M observations: photo m shows point n at image point x.
 
-    The coefficients c are independent with mean 0 and deviation 1, each coordinate of d_i has
-    deviation sigma_i.
+    Attributes:
+        photo: (M,) index of the photo.
+        point: (M,) index of the point.
+        image_points: (M, 2) px.
+        sigma_px: (M,) standard deviation per axis.
+        for_cameras: (M,) whether it enters the equations of the cameras (dense.joint). A detector's
+            landmark, which slides over the face with the view, may constrain the shape only.
+    """
+
+    photo: Int[Array, " m"]
+    point: Int[Array, " m"]
+    image_points: Float[Array, "m 2"]
+    sigma_px: Float[Array, " m"]
+    for_cameras: Bool[Array, " m"]
+
+
+@dataclass(frozen=True)
+class PointPrior:
+    """Gaussian prior of N points: X_n = mean_n + sum_i c_i B_in + d_n.
 
     Attributes:
         mean: (N, 3) mm.
-        components: (C, N, 3) mm.
-        sigma: (N,) mm, infinite where nothing is known.
+        components: (C, N, 3) mm, B; their coefficients have mean 0 and standard deviation 1.
+        precision: (N, 3, 3) 1 / mm^2, of the deviations d; 0 where nothing is known.
     """
 
     mean: Float[Array, "n 3"]
     components: Float[Array, "c n 3"]
-    sigma: Float[Array, " n"]
+    precision: Float[Array, "n 3 3"]
 
 
 @dataclass(frozen=True)
-class Bundle:
-    """The unknowns.
+class FocalGroups:
+    """Which photos share a focal length, and the Gaussian prior of each log focal length.
+
+    Attributes:
+        group: (K,) index of each photo's group, from 0.
+        log_focal: (G,) mean of log(px).
+        deviation: (G,) standard deviation of log(px); infinite where nothing is known.
+    """
+
+    group: Int[Array, " k"]
+    log_focal: Float[Array, " g"]
+    deviation: Float[Array, " g"]
+
+    def sum_by_unknown(self, values: Float[Array, "... k 7"]) -> Float[Array, "... d"]:
+        """Values of each photo's parameters summed by unknown, D = 6K + G: poses, focal lengths."""
+        membership = np.eye(len(self.log_focal))[self.group]
+        poses = values[..., :POSE_SIZE].reshape(*values.shape[:-2], -1)
+        return np.concatenate([poses, values[..., POSE_SIZE] @ membership], axis=-1)
+
+    def join_blocks(self, blocks: Float[Array, "k 7 7"]) -> Float[Array, "d d"]:
+        """Each photo's matrix summed into one over all unknowns."""
+        photos = np.arange(len(blocks))
+        square = np.zeros((len(blocks), CAMERA_SIZE, len(blocks), CAMERA_SIZE))
+        square[photos, :, photos] = blocks
+        return self.sum_by_unknown(np.moveaxis(self.sum_by_unknown(square), -1, 0)).T
+
+
+@dataclass(frozen=True)
+class CameraPrior:
+    """Independent Gaussian priors of poses and focal lengths.
+
+    Attributes:
+        R: (K, 3, 3) mean R_cam_head.
+        t: (K, 3) mm, mean t_cam_head.
+        focal: the focal lengths.
+        pose_deviation: (6,) of rotation vector (rad), x and y (mm) and log depth; infinite where
+            nothing is known.
+    """
+
+    R: Float[Array, "k 3 3"]
+    t: Float[Array, "k 3"]
+    focal: FocalGroups
+    pose_deviation: Float[Array, " 6"]
+
+    @cached_property
+    def precision(self) -> Float[Array, " d"]:
+        """(6K + G,) of poses and log focal lengths."""
+        return np.append(
+            np.tile(self.pose_deviation**-2.0, len(self.R)), self.focal.deviation**-2.0
+        )
+
+    def deviations(self, state: BundleState) -> Float[Array, " d"]:
+        """(6K + G,) of the state from the means."""
+        rotation = rotation_to_vector(state.R @ np.swapaxes(self.R, 1, 2))
+        translation = state.t[:, :2] - self.t[:, :2]
+        depth = np.log(state.t[:, 2:] / self.t[:, 2:])
+        poses = np.concatenate([rotation, translation, depth], axis=1)
+        return np.append(poses, state.log_focal - self.focal.log_focal)
+
+
+@dataclass(frozen=True)
+class BundleState:
+    """Values of all unknowns.
 
     Attributes:
         R: (K, 3, 3) R_cam_head.
-        t: (K, 3) mm.
+        t: (K, 3) mm, t_cam_head.
         log_focal: (G,), one a group of photos.
         points: (N, 3) mm.
-        coefficients: (C,) of the shape prior.
+        coefficients: (C,) of the point prior's components.
     """
 
     R: Float[Array, "k 3 3"]
@@ -65,174 +148,190 @@ class Bundle:
     points: Float[Array, "n 3"]
     coefficients: Float[Array, " c"]
 
+    @classmethod
+    def of(
+        cls,
+        cameras: Sequence[Camera],
+        points: Float[Array, "n 3"],
+        group: Int[Array, " k"],
+        coefficients: int,
+    ) -> BundleState:
+        """These cameras and points, the mean log focal length of each group, coefficients of 0."""
+        arrays = PinholeArrays.of(cameras)
+        log_focal = np.bincount(group, np.log(arrays.focal_px)) / np.bincount(group)
+        return cls(arrays.R, arrays.t, log_focal, np.array(points, float), np.zeros(coefficients))
+
+    def moved(
+        self, common: Float[Array, " q"], points: Float[Array, "n 3"], fraction: float = 1.0
+    ) -> BundleState:
+        """The state after a fraction of a step: (6K + G + C,) and (N, 3) mm."""
+        common = fraction * common
+        poses, focal, coefficients = np.split(
+            common, np.cumsum([POSE_SIZE * len(self.R), len(self.log_focal)])
+        )
+        poses = poses.reshape(-1, POSE_SIZE)
+        log_depth = np.clip(poses[:, 5], -_MAX_LOG_STEP, _MAX_LOG_STEP)
+        # Depth moves by a factor, so that focal length and distance trade along a straight line.
+        return BundleState(
+            rotation_from_vector(poses[:, :3]) @ self.R,
+            np.column_stack([self.t[:, :2] + poses[:, 3:5], self.t[:, 2] * np.exp(log_depth)]),
+            self.log_focal + np.clip(focal, -_MAX_LOG_STEP, _MAX_LOG_STEP),
+            self.points + fraction * points,
+            self.coefficients + coefficients,
+        )
+
+    def cameras(self, like: Sequence[Camera], group: Int[Array, " k"]) -> tuple[Camera, ...]:
+        """The state's cameras, with the sizes and principal points of others."""
+        focal_px = np.exp(self.log_focal)[group]
+        return tuple(
+            replace(
+                camera,
+                R_cam_head=self.R[k],
+                t_cam_head=self.t[k],
+                focal_px=float(focal_px[k]),
+            )
+            for k, camera in enumerate(like)
+        )
+
 
 @dataclass(frozen=True)
-class BundleData:
-    """What is observed and believed.
+class PointBlocks:
+    """The points' normal equations while cameras and coefficients stay.
 
     Attributes:
-        image: (K, N, 2) px relative to the principal points, 0 where unseen.
-        precision: (K, N) 1 / px, 0 where unseen.
-        group: (K,) index of each photo's focal length.
-        log_focal_mean: (G,) and log_focal_precision: (G,), 0 without a prior.
-        shape: the shape prior or None.
-        loss: of squared residuals over their variance.
-        marginal: integrate over the points' places (bundle.marginal_likelihood); needs shape.
+        information: (N, 3, 3) 1 / mm^2, P + sum b'wb with b the point Jacobian.
+        gradient: (N, 3) 1 / mm, P d + sum b'wr.
+        prior_gradient: (N, 3), its part P d.
     """
 
-    image: Float[Array, "k n 2"]
-    precision: Float[Array, "k n"]
-    group: Int[Array, " k"]
-    log_focal_mean: Float[Array, " g"]
-    log_focal_precision: Float[Array, " g"]
-    shape: ShapePrior | None
-    loss: Loss
-    marginal: bool = False
+    information: Float[Array, "n 3 3"]
+    gradient: Float[Array, "n 3"]
+    prior_gradient: Float[Array, "n 3"]
 
 
-def bundle_residuals(bundle: Bundle, data: BundleData) -> Float[Array, "k n 2"]:
-    """(Projected - observed) over sigma; 0 where unseen."""
-    in_camera = bundle.points @ np.swapaxes(bundle.R, 1, 2) + bundle.t[:, None]
-    focal = np.exp(bundle.log_focal)[data.group][:, None, None]
-    projected = focal * in_camera[..., :2] / in_camera[..., 2:]
-    return data.precision[..., None] * (projected - data.image)
+class BundleProblem:
+    """What is observed and known beforehand, with what stays the same from step to step.
 
-
-def bundle_cost(bundle: Bundle, data: BundleData) -> float:
-    """Minus the logarithm of the posterior, up to a constant; infinite with a point behind."""
-    in_camera = bundle.points @ np.swapaxes(bundle.R[:, 2:], 1, 2) + bundle.t[:, None, 2:]
-    if (in_camera[data.precision > 0] <= 0).any():
-        return np.inf
-    squared = (bundle_residuals(bundle, data) ** 2).sum(axis=-1)
-    cost = data.loss(squared)[0].sum()
-    cost += (_focal_residuals(bundle, data) ** 2).sum() + (bundle.coefficients**2).sum()
-    if data.shape is not None:
-        cost += (_shape_residuals(bundle, data.shape) ** 2).sum()
-    return 0.5 * float(cost) + _evidence(bundle, data)[0]
-
-
-def move_bundle(bundle: Bundle, step: tuple[Array, Array]) -> Bundle:
-    """The unknowns after a step: (common (6K + G + C,), points (N, 3))."""
-    common, point_step = step
-    photos, groups = len(bundle.R), len(bundle.log_focal)
-    pose, focal, coefficients = np.split(common, [POSE_SIZE * photos, POSE_SIZE * photos + groups])
-    pose = pose.reshape(photos, POSE_SIZE)
-    # Depth moves by a factor, so that focal length and distance trade along a straight line.
-    depth = bundle.t[:, 2] * np.exp(np.clip(pose[:, 5], -3, 3))
-    return Bundle(
-        rotation_from_vector(pose[:, :3]) @ bundle.R,
-        np.column_stack([bundle.t[:, :2] + pose[:, 3:5], depth]),
-        bundle.log_focal + np.clip(focal, -3, 3),
-        bundle.points + point_step,
-        bundle.coefficients + coefficients,
-    )
-
-
-def bundle_jacobians(
-    bundle: Bundle, data: BundleData
-) -> tuple[Float[Array, "k n 2 7"], Float[Array, "k n 2 3"]]:
-    """Derivatives of bundle_residuals by the photo's step (6 and its log focal) and the point."""
-    rotated = bundle.points @ np.swapaxes(bundle.R, 1, 2)
-    x, y, z = np.moveaxis(rotated + bundle.t[:, None], -1, 0)
-    scale = np.exp(bundle.log_focal)[data.group][:, None] * data.precision / z
-    by_camera = np.zeros((*x.shape, 2, 3))
-    by_camera[..., 0, 0], by_camera[..., 0, 2] = scale, -scale * x / z
-    by_camera[..., 1, 1], by_camera[..., 1, 2] = scale, -scale * y / z
-    by_photo = np.empty((*x.shape, 2, 7))
-    by_photo[..., :3] = -by_camera @ cross_matrix(rotated)
-    by_photo[..., 3:5] = by_camera[..., :2]
-    by_photo[..., 5] = by_camera[..., 2] * bundle.t[:, None, 2:]
-    by_photo[..., 6] = scale[..., None] * np.stack([x, y], axis=-1)
-    by_point: Array = by_camera @ bundle.R[:, None]
-    return by_photo, by_point
-
-
-def linearize_bundle(bundle: Bundle, data: BundleData) -> BlockSystem:
-    """Normal equations in the step, the points as blocks.
-
-    Robust terms enter by their weights, the evidence by its gradient.
+    Args:
+        cameras: K of them, for their principal points.
+        observations: M of them.
+        point_prior: of the N points.
+        camera_prior: of the K cameras.
     """
-    residuals = bundle_residuals(bundle, data)
-    by_photo, by_point = bundle_jacobians(bundle, data)
-    root = np.sqrt(data.loss((residuals**2).sum(axis=-1))[1])[..., None]
-    residuals, by_photo, by_point = (
-        residuals * root,
-        by_photo * root[..., None],
-        by_point * root[..., None],
-    )
-    photos, points = len(bundle.R), len(bundle.points)
-    size = POSE_SIZE * photos + len(bundle.log_focal) + len(bundle.coefficients)
-    common, gradient = np.zeros((size, size)), np.zeros(size)
-    coupling = np.zeros((points, size, 3))
-    by_evidence = _evidence(bundle, data)[1]
-    for k in range(photos):
-        own = _columns(k, photos, data.group)
-        gradient[own] += by_evidence[k]
-        flat = by_photo[k].reshape(-1, POSE_SIZE + 1)
-        common[np.ix_(own, own)] += flat.T @ flat
-        gradient[own] += flat.T @ residuals[k].ravel()
-        coupling[:, own] += np.swapaxes(by_photo[k], 1, 2) @ by_point[k]
-    stacked = np.swapaxes(by_point, 0, 1).reshape(points, 2 * photos, 3)
-    blocks = np.swapaxes(stacked, 1, 2) @ stacked
-    block_gradient = np.einsum("knij,kni->nj", by_point, residuals)
-    system = BlockSystem(common, blocks, coupling, gradient, block_gradient)
-    _add_priors(system, bundle, data)
-    return system
+
+    def __init__(
+        self,
+        cameras: Sequence[Camera],
+        observations: Observations,
+        point_prior: PointPrior,
+        camera_prior: CameraPrior,
+    ) -> None:
+        self.observations, self.point_prior, self.camera_prior = (
+            observations,
+            point_prior,
+            camera_prior,
+        )
+        principal = np.stack([camera.principal for camera in cameras])
+        self.image = observations.image_points - principal[observations.photo]
+        count, photos = len(point_prior.mean), len(cameras)
+        self.sum_by_point = SegmentSum(observations.point, count)
+        self.sum_by_photo = SegmentSum(observations.photo, photos)
+        pair = observations.point * photos + observations.photo
+        self._sum_by_pair = SegmentSum(pair, count * photos)
+        # (3N, C): as one matrix, so that sums over points are single products.
+        components = point_prior.components
+        self.basis = np.ascontiguousarray(components.reshape(len(components), 3 * count).T)
+
+    def project(self, state: BundleState, points: Float[Array, "n 3"]) -> Projection:
+        """The observed points, if they lay at these places, by the state's cameras.
+
+        Raises:
+            EstimationError: a point lies behind its camera.
+        """
+        focal_px = np.exp(state.log_focal)[self.camera_prior.focal.group]
+        cameras = PinholeArrays(state.R, state.t, focal_px)
+        return project_points(cameras, self.observations.photo, points[self.observations.point])
+
+    def point_deviations(self, state: BundleState) -> Float[Array, "n 3"]:
+        """(N, 3) mm: d, the points less what the components explain."""
+        return (
+            state.points - self.point_prior.mean - (self.basis @ state.coefficients).reshape(-1, 3)
+        )
+
+    def point_blocks(self, state: BundleState, at: Reprojection) -> PointBlocks:
+        """Normal equations of each point by itself."""
+        jacobian, precision = at.projection.point_jacobian, self.point_prior.precision
+        weighted = _weighted(at, jacobian)
+        prior_gradient = apply_each(precision, self.point_deviations(state))
+        return PointBlocks(
+            precision + self.sum_by_point(weighted @ jacobian),
+            prior_gradient + self.sum_by_point(apply_each(weighted, at.residuals)),
+            prior_gradient,
+        )
+
+    def camera_equations(
+        self, state: BundleState, at: Reprojection, left: Float[Array, "m 2 7"]
+    ) -> tuple[Float[Array, "d d"], Float[Array, "n d 3"], Float[Array, " d"]]:
+        """sum z'w (a y + b x) + S y = -sum z'wr - S s, with prior precision S and deviation s.
+
+        Args:
+            state: at which they are linearized.
+            at: its reprojection errors r, weights w, and Jacobians a of cameras, b of points.
+            left: z; the camera Jacobian makes them those of least squares.
+
+        Returns:
+            (D, D) of the camera step y, (N, D, 3) of the point steps x, and minus the right side.
+        """
+        focal, precision = self.camera_prior.focal, self.camera_prior.precision
+        weighted = _weighted(at, left)
+        own = focal.join_blocks(self.sum_by_photo(weighted @ at.projection.camera_jacobian()))
+        gradient = focal.sum_by_unknown(self.sum_by_photo(apply_each(weighted, at.residuals)))
+        pairs = self._sum_by_pair(_weighted(at, at.projection.point_jacobian) @ left)
+        by_photo = pairs.reshape(len(state.points), -1, 3, CAMERA_SIZE)
+        coupling = focal.sum_by_unknown(np.swapaxes(by_photo, 1, 2))
+        return (
+            own + np.diag(precision),
+            np.swapaxes(coupling, 1, 2),
+            gradient + precision * self.camera_prior.deviations(state),
+        )
+
+    def normal_equations(self, state: BundleState, at: Reprojection) -> BlockSystem:
+        """Of least squares in the step: cameras and coefficients in common, a block a point."""
+        points = self.point_blocks(state, at)
+        own, coupling, gradient = self.camera_equations(state, at, at.projection.camera_jacobian())
+        size = len(own)
+        common = np.zeros((size + self.basis.shape[1], size + self.basis.shape[1]))
+        common[:size, :size] = own
+        common[size:, size:] = self._coefficient_information
+        by_coefficients = state.coefficients - points.prior_gradient.ravel() @ self.basis
+        # In memory by point, axis and unknown: as BlockSystem wants it.
+        joined = np.concatenate([np.swapaxes(coupling, 1, 2), -self._weighted_basis], axis=2)
+        return BlockSystem(
+            common,
+            points.information,
+            np.swapaxes(joined, 1, 2),
+            np.append(gradient, by_coefficients),
+            points.gradient,
+        )
+
+    @cached_property
+    def _weighted_basis(self) -> Float[Array, "n 3 c"]:
+        """P B."""
+        return self.point_prior.precision @ self.basis.reshape(
+            len(self.point_prior.mean), 3, self.basis.shape[1]
+        )
+
+    @cached_property
+    def _coefficient_information(self) -> Float[Array, "c c"]:
+        """B'P B, and the coefficients' own prior."""
+        weighted = self._weighted_basis.reshape(self.basis.shape)
+        return self.basis.T @ weighted + np.eye(self.basis.shape[1])
 
 
-def similarity_constraints(
-    points: Float[Array, "n 3"], counts: Bool[Array, " n"]
-) -> Float[Array, "n 7 3"]:
-    """What a similarity changes of the points that count: their mean, their turn, their size."""
-    spread = points - points[counts].mean(axis=0)
-    spread = spread / np.sqrt((spread[counts] ** 2).mean())
-    rows = np.concatenate(
-        [np.tile(np.eye(3), (len(points), 1, 1)), cross_matrix(spread), spread[:, None]], axis=1
-    )
-    return rows * counts[:, None, None]
+def apply_each(matrices: Float[Array, "n a b"], vectors: Float[Array, "n b"]) -> Array:
+    """(N, A): every matrix times its vector."""
+    return (matrices @ vectors[..., None])[..., 0]
 
 
-def _columns(photo: int, photos: int, group: Int[Array, " k"]) -> Int[Array, " 7"]:
-    """Places of a photo's seven unknowns in the common step."""
-    pose = POSE_SIZE * photo + np.arange(POSE_SIZE)
-    return np.append(pose, POSE_SIZE * photos + group[photo])
-
-
-def _evidence(bundle: Bundle, data: BundleData) -> tuple[float, Float[Array, "k 7"]]:
-    """Of the points' places, at the prior's mean, so that it is a matter of the cameras alone."""
-    if data.shape is None or not data.marginal:
-        return 0.0, np.zeros((len(bundle.R), POSE_SIZE + 1))
-    focal = np.exp(bundle.log_focal)[data.group]
-    return point_evidence(
-        bundle.R, bundle.t, focal, data.precision, data.shape.mean, data.shape.sigma
-    )
-
-
-def _focal_residuals(bundle: Bundle, data: BundleData) -> Float[Array, " g"]:
-    return data.log_focal_precision * (bundle.log_focal - data.log_focal_mean)
-
-
-def _shape_residuals(bundle: Bundle, shape: ShapePrior) -> Float[Array, "n 3"]:
-    believed = shape.mean + np.tensordot(bundle.coefficients, shape.components, 1)
-    return (bundle.points - believed) / shape.sigma[:, None]
-
-
-def _add_priors(system: BlockSystem, bundle: Bundle, data: BundleData) -> None:
-    """Adds the focal and shape priors to the system's arrays, in place."""
-    first = POSE_SIZE * len(bundle.R)
-    focal = first + np.arange(len(bundle.log_focal))
-    system.common[focal, focal] += data.log_focal_precision**2
-    system.common_gradient[focal] += data.log_focal_precision * _focal_residuals(bundle, data)
-    if data.shape is None:
-        return
-    precision = 1 / data.shape.sigma
-    residuals = _shape_residuals(bundle, data.shape)
-    by_coefficient = -data.shape.components * precision[:, None]
-    system.blocks[:, range(3), range(3)] += (precision**2)[:, None]
-    system.block_gradient[:] += precision[:, None] * residuals
-    rest = slice(focal[-1] + 1, None)
-    count = len(bundle.coefficients)
-    flat = by_coefficient.reshape(count, -1)
-    system.common[rest, rest] += flat @ flat.T + np.eye(count)
-    system.common_gradient[rest] += flat @ residuals.ravel() + bundle.coefficients
-    system.coupling[:, rest] += np.swapaxes(by_coefficient, 0, 1) * precision[:, None, None]
+def _weighted(at: Reprojection, jacobian: Float[Array, "m 2 a"]) -> Float[Array, "m a 2"]:
+    return np.swapaxes(at.weights[:, None, None] * jacobian, 1, 2)

@@ -9,8 +9,8 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int
 from mien.assets.generic import GenericHead
-from mien.reconstruction.dense.joint import JointSolution, matching_noise
-from mien.reconstruction.dense.joint_problem import POSE
+from mien.reconstruction.bundle.projection import POSE_SIZE
+from mien.reconstruction.dense.joint import JointSolution, noise_factor
 from mien.reconstruction.dense.surface_tracks import Tracks
 
 FEW_PLACES = 60
@@ -75,8 +75,8 @@ class Quality:
 def judge_registration(tracks: Tracks, solution: JointSolution, generic: GenericHead) -> Quality:
     """From the last joint solution and the tracks it rests on."""
     photos = len(solution.cameras)
-    off = solution.off_sigmas[: len(tracks.photo)]
-    wrong = off > _WRONG_SIGMAS * matching_noise(off)
+    off = solution.normalized_residuals[: len(tracks.photo)]
+    wrong = off > _WRONG_SIGMAS * noise_factor(off)
     masks = np.stack([generic.regions[name] for name in REGIONS], axis=-1)
     inside = tracks.on(masks)[tracks.place] > 0.5
     disagreeing = np.full((photos, len(REGIONS)), np.nan)
@@ -101,6 +101,6 @@ def _turn_deviations(solution: JointSolution, photos: int) -> Float[Array, " k"]
         # Each photo's unknowns turn its own camera's space.
         by_turns = np.zeros((3, len(covariance)))
         by_turns[:, :3] = -rotations[k] @ rotations[0].T
-        by_turns[:, POSE * k : POSE * k + 3] = np.eye(3)
+        by_turns[:, POSE_SIZE * k : POSE_SIZE * k + 3] = np.eye(3)
         deviations[k] = np.sqrt(max(float(np.trace(by_turns @ covariance @ by_turns.T)), 0.0))
     return deviations

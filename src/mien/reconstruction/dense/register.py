@@ -14,15 +14,10 @@ from mien.capture.source import CapturedView
 from mien.mesh import Mesh
 from mien.numeric.rotation import angle_between
 from mien.progress import StepProgress, no_step_progress
+from mien.reconstruction.bundle.problem import FocalGroups, Observations, PointPrior
 from mien.reconstruction.dense.crops import finest_mm_per_px, visible_mesh
 from mien.reconstruction.dense.eyes import seat_eyes
-from mien.reconstruction.dense.joint import (
-    JointSolution,
-    Lenses,
-    PlacePrior,
-    Sightings,
-    solve_jointly,
-)
+from mien.reconstruction.dense.joint import JointSolution, solve_jointly
 from mien.reconstruction.dense.prior import HeadPrior, load_head_prior
 from mien.reconstruction.dense.quality import FEW_PLACES, Quality, judge_registration
 from mien.reconstruction.dense.surface import NO_OFFSETS, Offsets, measure_offsets, move_surface
@@ -79,7 +74,7 @@ def register_views(
     cameras: Sequence[Camera],
     vertices: Float[Array, "v 3"],
     features: Features,
-    lenses: Lenses,
+    focal: FocalGroups,
     generic: GenericHead,
     *,
     scales: Sequence[float] = SCALES_MM,
@@ -100,7 +95,7 @@ def register_views(
     """
     tell = progress or no_step_progress
     prior = load_head_prior()
-    problem = _Problem(views, features, lenses, generic, prior, _rotations(cameras))
+    problem = _Problem(views, features, focal, generic, prior, _rotations(cameras))
     state = _State(tuple(cameras), vertices)
     scales = _useful(scales, cameras)
     for step, scale in enumerate(scales):
@@ -116,7 +111,7 @@ def register_views(
     finest = problem.tracks(state, max(FINEST_MM, finest_mm_per_px(state.cameras)), FINE_PLACES)
     vertices, offsets = problem.moved(state.vertices, finest, state.cameras)
     vertices = seat_eyes(_on_marks(vertices, features, state.cameras, generic), generic)
-    count = len(solution.coefficients)
+    count = len(solution.state.coefficients)
     deviation = vertex_deviation(
         solution.covariance[-count:, -count:], prior, finest, offsets, generic
     )
@@ -130,14 +125,14 @@ def deviation_by_features(
     cameras: Sequence[Camera],
     vertices: Float[Array, "v 3"],
     features: Features,
-    lenses: Lenses,
+    focal: FocalGroups,
     generic: GenericHead,
 ) -> Float[Array, " v"]:
     """(V,) mm: standard deviation of a head that landmarks and marks alone tell (one photo)."""
     prior = load_head_prior()
-    problem = _Problem(views, features, lenses, generic, prior, _rotations(cameras))
+    problem = _Problem(views, features, focal, generic, prior, _rotations(cameras))
     solution = problem.solve(_State(tuple(cameras), vertices), NO_TRACKS)
-    count = len(solution.coefficients)
+    count = len(solution.state.coefficients)
     covariance = solution.covariance[-count:, -count:]
     return vertex_deviation(covariance, prior, NO_TRACKS, NO_OFFSETS, generic)
 
@@ -154,15 +149,15 @@ class _Problem:
 
     views: Sequence[CapturedView]
     features: Features
-    lenses: Lenses
+    focal: FocalGroups
     generic: GenericHead
     prior: HeadPrior
-    anchors: Float[Array, "k 3 3"]
+    prior_rotations: Float[Array, "k 3 3"]
 
     def round(self, state: _State, tracks: Tracks) -> tuple[_State, JointSolution]:
         """Solve for all, then move the surface."""
         solution = self.solve(state, tracks)
-        vertices = self.prior.vertices(solution.coefficients)
+        vertices = self.prior.vertices(solution.state.coefficients)
         vertices, _ = self.moved(vertices, tracks, solution.cameras)
         return _State(solution.cameras, vertices), solution
 
@@ -189,14 +184,14 @@ class _Problem:
         leading = by_hand | alone[photo]
         sigma = np.where(leading, sigma, LANDMARK_SHARE * sigma)
         crowding = np.sqrt(tracks.crowding)[tracks.place]
-        sightings = Sightings(
+        sightings = Observations(
             photo=np.append(tracks.photo, photo),
-            place=np.append(tracks.place, feature + len(tracks.corners)),
+            point=np.append(tracks.place, feature + len(tracks.corners)),
             image_points=np.concatenate(
                 [tracks.image_points, features.image_points[photo, feature]]
             ),
             sigma_px=np.append(tracks.sigma_px * crowding, sigma),
-            guides=np.append(np.ones(len(tracks.photo), bool), leading),
+            for_cameras=np.append(np.ones(len(tracks.photo), bool), leading),
         )
 
         def on(values: Array) -> Array:
@@ -205,13 +200,18 @@ class _Problem:
         attached_sd = np.where(features.by_hand.any(axis=0), NAMED_SD_MM, ATTACHED_SD_MM)
         attached = np.eye(3) / attached_sd[:, None, None] ** 2
         mesh = self.generic.mesh.with_vertices(state.vertices)
-        beliefs = PlacePrior(
+        beliefs = PointPrior(
             on(prior.mean),
             on(prior.components),
             np.concatenate([_skin_precision(tracks, mesh, self.generic), attached]),
         )
         return solve_jointly(
-            state.cameras, on(state.vertices), sightings, beliefs, self.lenses, anchors=self.anchors
+            state.cameras,
+            on(state.vertices),
+            sightings,
+            beliefs,
+            self.focal,
+            prior_rotations=self.prior_rotations,
         )
 
 

@@ -14,8 +14,8 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.mesh import Mesh
 from mien.numeric.segment_sum import SegmentSum
-from mien.reconstruction.dense.joint import matching_noise
-from mien.reconstruction.dense.projection import Pinholes, project_places
+from mien.reconstruction.bundle.projection import PinholeArrays, project_points
+from mien.reconstruction.dense.joint import noise_factor
 from mien.reconstruction.dense.surface_tracks import Tracks
 from mien.reconstruction.shape.deformation import with_round_eyes
 
@@ -57,24 +57,24 @@ def measure_offsets(
     start = tracks.on(mesh.vertices)
     normals = tracks.on(mesh.vertex_normals())
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    pinholes, by_place = Pinholes.of(cameras), SegmentSum(tracks.place, len(start))
+    pinholes, by_place = PinholeArrays.of(cameras), SegmentSum(tracks.place, len(start))
     principal = np.stack([camera.principal for camera in cameras])
     image = tracks.image_points - principal[tracks.photo]
     weak = np.eye(3) / _FAR_MM**2
     places = start
     for _ in range(rounds):
-        seen = project_places(pinholes, tracks.photo, places[tracks.place])
+        seen = project_points(pinholes, tracks.photo, places[tracks.place])
         residuals = seen.image_points - image
         squared = (residuals**2).sum(axis=1) / tracks.sigma_px**2
         weights = 1 / (tracks.sigma_px**2 * (1 + squared / 4))
-        weighted = np.swapaxes(weights[:, None, None] * seen.by_place, 1, 2)
-        covariance = np.linalg.inv(weak + by_place(weighted @ seen.by_place))
+        weighted = np.swapaxes(weights[:, None, None] * seen.point_jacobian, 1, 2)
+        covariance = np.linalg.inv(weak + by_place(weighted @ seen.point_jacobian))
         gradient = by_place((weighted @ residuals[..., None])[..., 0]) + (places - start) @ weak
         places = places - (covariance @ gradient[..., None])[..., 0]
     offsets: Array = ((places - start) * normals).sum(axis=1)
     sd = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariance, normals))
     # Places that share a patch of the matching share its error.
-    sd *= matching_noise(np.sqrt(squared)) * np.sqrt(tracks.crowding)
+    sd *= noise_factor(np.sqrt(squared)) * np.sqrt(tracks.crowding)
     return Offsets(offsets, np.maximum(sd, LEAST_SD_MM))
 
 

@@ -10,19 +10,19 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.capture.faces.detector import NO_FACE
+from mien.capture.faces.detector import NO_FACE_FOUND
 from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
 from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
 from mien.progress import StepProgress, no_step_progress
 from mien.reconstruction.expression.gaze import MOST_RAD, iris_directions, yaw_pitch_of
-from mien.reconstruction.expression.known_head import KnownHead, feature_sightings
+from mien.reconstruction.expression.known_head import KnownHead, feature_observations
 from mien.reconstruction.expression.skin_tracking import follow_skin
 from mien.reconstruction.expression.unit_fit import Explained, explain
 from mien.reconstruction.features import gather_features
-from mien.reconstruction.landmark_fit import focal_beliefs, residuals_of
-from mien.reconstruction.observations import Sightings, measure_misses
+from mien.reconstruction.landmark_fit import focal_priors, residuals_of
+from mien.reconstruction.observations import SurfaceObservations, reproject
 from mien.reconstruction.outliers import PhotoFit, find_misfit, judge_marks, typical_misfits
 from mien.reconstruction.resection import LEAST_FEATURES, place_cameras
 from mien.reconstruction.shape.skin import move_skin
@@ -81,7 +81,7 @@ def fit_expression(
     from threadpoolctl import threadpool_limits
 
     tell = progress or no_step_progress
-    left_out = {view.photo.name: NO_FACE for view in views if not view.marked}
+    left_out = {view.photo.name: NO_FACE_FOUND for view in views if not view.marked}
     views = [view for view in views if view.marked]
     counts = gather_features(views, known.generic).seen.sum(axis=1) if views else []
     for view, count in zip(views, counts, strict=True):
@@ -112,25 +112,25 @@ def _fit(views: Sequence[CapturedView], known: KnownHead, tell: StepProgress) ->
     generic = known.generic
     features = gather_features(views, generic)
     focal, focal_sd = _lenses(views, known)
-    sightings = feature_sightings(features, known)
+    observations = feature_observations(features, known)
     expected = _expected_units(views, known)
     free = np.array([not name.startswith(_STEADY) for name in generic.unit_names])
     cameras = place_cameras(views, features, focal, known.vertices)
     start = Explained(cameras, np.where(free, expected, 0.0))
 
-    def explained(seen: Sightings, before: Explained) -> Explained:
+    def explained(seen: SurfaceObservations, before: Explained) -> Explained:
         return explain(seen, before, expected, focal_sd, known, free=free)
 
-    found = by_marks = explained(sightings, start)
-    vertices, everything, held = found.vertices(known), sightings, _held(generic)
+    found = by_marks = explained(observations, start)
+    vertices, everything, held = found.vertices(known), observations, _held(generic)
     for step, scale in enumerate(FOLLOWED_MM):
         tell(step, len(FOLLOWED_MM))
         vertices = move_skin(vertices, everything, found.cameras, generic, held=held)
-        everything = _with_skin(sightings, views, found.cameras, vertices, known, scale)
+        everything = _with_skin(observations, views, found.cameras, vertices, known, scale)
         found = explained(everything, found)
-        strange = _strange_skin(everything, len(sightings.photo), found, by_marks, known)
+        strange = _strange_skin(everything, len(observations.photo), found, by_marks, known)
         if strange:
-            everything = _without_skin(everything, len(sightings.photo), strange)
+            everything = _without_skin(everything, len(observations.photo), strange)
             found = explained(everything, by_marks)
         vertices = found.vertices(known)
     vertices = move_skin(vertices, everything, found.cameras, generic, held=held)
@@ -147,37 +147,43 @@ def _fit(views: Sequence[CapturedView], known: KnownHead, tell: StepProgress) ->
 
 
 def _strange_skin(
-    sightings: Sightings, first: int, found: Explained, by_marks: Explained, known: KnownHead
+    observations: SurfaceObservations,
+    first: int,
+    found: Explained,
+    by_marks: Explained,
+    known: KnownHead,
 ) -> list[int]:
     """Photos whose skin is not neutral's: what was found again contradicts itself or the marks.
 
     Args:
         first: number of the first sighting of skin.
     """
-    misses = measure_misses(sightings, sightings.on(found.vertices(known)), found.cameras)
+    errors = reproject(observations, observations.on(found.vertices(known)), found.cameras)
     strange = []
     for k, (camera, before) in enumerate(zip(found.cameras, by_marks.cameras, strict=True)):
-        mine = np.flatnonzero(sightings.photo[first:] == k) + first
+        mine = np.flatnonzero(observations.photo[first:] == k) + first
         if not len(mine):
             continue
         mm_per_px = float(camera.t_cam_head[2]) / camera.focal_px
-        off = float(np.median(np.linalg.norm(misses.residuals[mine], axis=1))) * mm_per_px
+        off = float(np.median(np.linalg.norm(errors.residuals[mine], axis=1))) * mm_per_px
         turned = float(angle_between(camera.R_cam_head, before.R_cam_head))
         if off > MOST_OFF_MM or turned > MOST_TURN_RAD:
             strange.append(k)
     return strange
 
 
-def _without_skin(sightings: Sightings, first: int, photos: Sequence[int]) -> Sightings:
-    skin = np.arange(len(sightings.photo)) >= first
-    return sightings.of(~(skin & np.isin(sightings.photo, photos)))
+def _without_skin(
+    observations: SurfaceObservations, first: int, photos: Sequence[int]
+) -> SurfaceObservations:
+    skin = np.arange(len(observations.photo)) >= first
+    return observations.of(~(skin & np.isin(observations.photo, photos)))
 
 
 def _lenses(
     views: Sequence[CapturedView], known: KnownHead
 ) -> tuple[Float[Array, " k"], Float[Array, " k"]]:
     """(K,) focal lengths, px, and the standard deviation of their logarithms."""
-    beliefs = focal_beliefs(views)
+    beliefs = focal_priors(views)
     focal, deviation = beliefs.focal_px.copy(), beliefs.deviation.copy()
     for k, view in enumerate(views):
         for other, camera in zip(known.views, known.cameras, strict=True):
@@ -200,19 +206,19 @@ def _expected_units(views: Sequence[CapturedView], known: KnownHead) -> Float[Ar
 
 
 def _with_skin(
-    sightings: Sightings,
+    observations: SurfaceObservations,
     views: Sequence[CapturedView],
     cameras: Sequence[Camera],
     vertices: Float[Array, "v 3"],
     known: KnownHead,
     scale: float,
-) -> Sightings:
-    """The sightings and the skin that is found again."""
+) -> SurfaceObservations:
+    """The observations and the skin that is found again."""
     for k, (view, camera) in enumerate(zip(views, cameras, strict=True)):
         skin = follow_skin(view, camera, vertices, known, photo=k, mm_per_px=scale)
         if skin is not None:
-            sightings = sightings.joined(skin)
-    return sightings
+            observations = observations.joined(skin)
+    return observations
 
 
 def _held(generic: GenericHead) -> Float[Array, " v"]:

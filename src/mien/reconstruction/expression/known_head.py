@@ -12,7 +12,7 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.source import CapturedView
 from mien.reconstruction.features import EDGE_SIGMA_MM, Features, gather_features
-from mien.reconstruction.observations import Sightings
+from mien.reconstruction.observations import SurfaceObservations
 
 EXPRESSED_EDGE_MM = 0.8
 """How far a landmark on an edge lies off its place on this person's head, once that is known."""
@@ -41,7 +41,7 @@ class KnownHead:
     generic: GenericHead
 
 
-def feature_sightings(features: Features, known: KnownHead) -> Sightings:
+def feature_observations(features: Features, known: KnownHead) -> SurfaceObservations:
     """Landmarks and marks of an expression's photos, corrected by what the neutral ones say.
 
     A detector means by a landmark a place that differs from person to person, but hardly between a
@@ -51,21 +51,21 @@ def feature_sightings(features: Features, known: KnownHead) -> Sightings:
     # Irises lie on the eyeballs, which turn by themselves.
     on_face = known.generic.regions["face"][features.corners].max(axis=1) > 0
     photo, column = np.nonzero(features.seen & (on_face | features.by_hand))
-    beside = _beside(features, known)
+    offset = _offset(features, known)
     landmark = ~features.by_hand[photo, column]
     on_edge = features.sigma_mm[photo, column] <= 2 * EDGE_SIGMA_MM
     sigma = np.where(on_edge, EXPRESSED_EDGE_MM, EXPRESSED_SKIN_MM)
-    return Sightings(
+    return SurfaceObservations(
         corners=features.corners[column],
         barycentrics=features.barycentrics[column],
-        beside=beside[column],
+        offset=offset[column],
         photo=photo,
         image_points=features.image_points[photo, column],
         sigma_mm=np.where(landmark, sigma, features.sigma_mm[photo, column]),
     )
 
 
-def _beside(features: Features, known: KnownHead) -> Float[Array, "n 3"]:
+def _offset(features: Features, known: KnownHead) -> Float[Array, "n 3"]:
     """(N, 3) mm, by which the neutral photos show each landmark off its place, on average."""
     seen = gather_features(known.views, known.generic)
     column_name = {name: column for column, name in enumerate(seen.names)}
@@ -80,8 +80,8 @@ def _beside(features: Features, known: KnownHead) -> Float[Array, "n 3"]:
         total[usable] += (confidence[:, None] * moved)[usable]
         weight += confidence
     mean = total / (weight + _HALF_BELIEVED)[:, None]
-    beside = np.zeros((len(features.names), 3))
+    offset = np.zeros((len(features.names), 3))
     for n, name in enumerate(features.names):
         if name in column_name:
-            beside[n] = mean[column_name[name]]
-    return beside
+            offset[n] = mean[column_name[name]]
+    return offset

@@ -16,7 +16,7 @@ from mien.numeric.rotation import angle_between
 from mien.reconstruction.dense.crops import crop_view, finest_mm_per_px, visible_mesh
 from mien.reconstruction.dense.matching import Sight, match_both
 from mien.reconstruction.expression.known_head import KnownHead
-from mien.reconstruction.observations import Sightings
+from mien.reconstruction.observations import SurfaceObservations
 
 MATCHED_SIGMA_MM = 0.4
 """Error of skin found again: wrinkles and light change what it looks like."""
@@ -33,7 +33,7 @@ def follow_skin(
     *,
     photo: int,
     mm_per_px: float,
-) -> Sightings | None:
+) -> SurfaceObservations | None:
     """Places of the neutral head's skin where the expression's photo shows them.
 
     The neutral photo that looks from the nearest side is drawn as the expression's camera would
@@ -66,10 +66,10 @@ def follow_skin(
     corners = still.triangles[raster.triangle_ids[rows, columns]]
     steady = _steady(known.generic)[corners].all(axis=1)
     rows, columns, corners = rows[steady], columns[steady], corners[steady]
-    return Sightings(
+    return SurfaceObservations(
         corners=corners,
         barycentrics=raster.barycentrics[rows, columns].astype(np.float64),
-        beside=np.zeros((len(rows), 3)),
+        offset=np.zeros((len(rows), 3)),
         photo=np.full(len(rows), photo),
         image_points=here.crop.to_photo(match.places[rows, columns]),
         # Places that share a patch of the matching share its error.

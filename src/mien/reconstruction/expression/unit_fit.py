@@ -9,9 +9,9 @@ import numpy as np
 from mien.arrays import Array, Bool, Float
 from mien.camera import Camera
 from mien.numeric.rotation import rotation_from_vector
-from mien.reconstruction.dense.projection import UNKNOWNS
+from mien.reconstruction.bundle.projection import CAMERA_SIZE
 from mien.reconstruction.expression.known_head import KnownHead
-from mien.reconstruction.observations import Sightings, measure_misses
+from mien.reconstruction.observations import SurfaceObservations, reproject
 
 UNIT_SD = 0.35
 """How far a unit's weight lies off what the detector's scores say."""
@@ -39,7 +39,7 @@ class Explained:
 
 
 def explain(
-    sightings: Sightings,
+    observations: SurfaceObservations,
     start: Explained,
     expected: Float[Array, " 52"],
     focal_sd: Float[Array, " k"],
@@ -49,7 +49,7 @@ def explain(
 ) -> Explained:
     """Cameras and unit weights of highest posterior.
 
-    Minimizes the Cauchy-weighted squared distances of the sightings, in units of their error, plus
+    Minimizes the Cauchy-weighted squared reprojection errors, in units of their sigma, plus
     the squared deviations of weights from `expected` and of log focal lengths from the start's;
     weights stay within 0 and 1.2.
 
@@ -61,18 +61,18 @@ def explain(
     from scipy.optimize import lsq_linear
 
     units = np.flatnonzero(free)
-    basis = sightings.on(known.units[units]) if len(units) else np.zeros((0, 0, 3))
-    rest = sightings.on(known.vertices) + sightings.beside
+    basis = observations.on(known.units[units]) if len(units) else np.zeros((0, 0, 3))
+    rest = observations.on(known.vertices) + observations.offset
     focal = np.log([camera.focal_px for camera in start.cameras])
     state = start
     for _ in range(_ROUNDS):
-        matrix, gradient = _normal_equations(sightings, state, rest, basis, units)
+        matrix, gradient = _normal_equations(observations, state, rest, basis, units)
         count = len(state.cameras)
-        lens = UNKNOWNS * np.arange(count) + UNKNOWNS - 1
+        lens = CAMERA_SIZE * np.arange(count) + CAMERA_SIZE - 1
         now = np.log([camera.focal_px for camera in state.cameras])
         matrix[lens, lens] += 1 / focal_sd**2
         gradient[lens] += (now - focal) / focal_sd**2
-        own = UNKNOWNS * count + np.arange(len(units))
+        own = CAMERA_SIZE * count + np.arange(len(units))
         matrix[own, own] += 1 / UNIT_SD**2
         gradient[own] += (state.weights[units] - expected[units]) / UNIT_SD**2
         matrix[np.diag_indices_from(matrix)] *= 1 + 1e-6
@@ -88,34 +88,34 @@ def explain(
 
 
 def _normal_equations(
-    sightings: Sightings,
+    observations: SurfaceObservations,
     state: Explained,
     rest: Float[Array, "m 3"],
     basis: Float[Array, "u m 3"],
     units: Array,
 ) -> tuple[Array, Array]:
     """J^T W J and J^T W r over all cameras' unknowns and the weights."""
-    photo, count = sightings.photo, len(state.cameras)
+    photo, count = observations.photo, len(state.cameras)
     places = rest + np.tensordot(state.weights[units], basis, axes=1) if len(units) else rest
-    misses = measure_misses(sightings, places, state.cameras)
-    jacobian = np.zeros((len(photo), 2, UNKNOWNS * count + len(units)))
+    errors = reproject(observations, places, state.cameras)
+    jacobian = np.zeros((len(photo), 2, CAMERA_SIZE * count + len(units)))
     rows = np.arange(len(photo))[:, None]
-    columns = UNKNOWNS * photo[:, None] + np.arange(UNKNOWNS)
-    jacobian[rows, :, columns] = np.swapaxes(misses.projection.by_camera(), 1, 2)
+    columns = CAMERA_SIZE * photo[:, None] + np.arange(CAMERA_SIZE)
+    jacobian[rows, :, columns] = np.swapaxes(errors.projection.camera_jacobian(), 1, 2)
     if len(units):
-        jacobian[:, :, UNKNOWNS * count :] = np.einsum(
-            "mij,umj->miu", misses.projection.by_place, basis
+        jacobian[:, :, CAMERA_SIZE * count :] = np.einsum(
+            "mij,umj->miu", errors.projection.point_jacobian, basis
         )
     flat = jacobian.reshape(-1, jacobian.shape[2])
-    weighted = flat * np.repeat(misses.weights, 2)[:, None]
-    return weighted.T @ flat, weighted.T @ misses.residuals.ravel()
+    weighted = flat * np.repeat(errors.weights, 2)[:, None]
+    return weighted.T @ flat, weighted.T @ errors.residuals.ravel()
 
 
 def _moved(state: Explained, step: Array, units: Array) -> Explained:
     count = len(state.cameras)
     cameras = []
     for camera, move in zip(
-        state.cameras, step[: UNKNOWNS * count].reshape(count, UNKNOWNS), strict=True
+        state.cameras, step[: CAMERA_SIZE * count].reshape(count, CAMERA_SIZE), strict=True
     ):
         turned = rotation_from_vector(move[:3]) @ camera.R_cam_head
         x, y, z = camera.t_cam_head
@@ -123,5 +123,5 @@ def _moved(state: Explained, step: Array, units: Array) -> Explained:
         focal = camera.focal_px * float(np.exp(np.clip(move[6], -0.5, 0.5)))
         cameras.append(replace(camera, R_cam_head=turned, t_cam_head=moved, focal_px=focal))
     weights = state.weights.copy()
-    weights[units] = np.clip(weights[units] + step[UNKNOWNS * count :], 0, MOST)
+    weights[units] = np.clip(weights[units] + step[CAMERA_SIZE * count :], 0, MOST)
     return Explained(tuple(cameras), weights)

@@ -15,7 +15,7 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.reconstruction.dense.eyes import seat_eyes
 from mien.reconstruction.features import EDGE_SIGMA_MM, Features
-from mien.reconstruction.observations import Sightings
+from mien.reconstruction.observations import SurfaceObservations
 from mien.reconstruction.shape.skin import move_skin
 
 EDGE_MM = 1.0
@@ -44,15 +44,15 @@ def guide_features(
     photo, column = np.nonzero(features.seen & features.on_edges)
     if not len(photo):
         return vertices
-    sightings = Sightings(
+    observations = SurfaceObservations(
         corners=features.corners[column],
         barycentrics=features.barycentrics[column],
-        beside=np.zeros((len(column), 3)),
+        offset=np.zeros((len(column), 3)),
         photo=photo,
         image_points=features.image_points[photo, column],
         sigma_mm=features.sigma_mm[photo, column] * EDGE_MM / EDGE_SIGMA_MM,
     )
     held = generic.regions["scalp"]
     across = ACROSS_SD_MM if measured else None
-    moved = move_skin(vertices, sightings, cameras, generic, held=held, across_sd_mm=across)
+    moved = move_skin(vertices, observations, cameras, generic, held=held, across_sd_mm=across)
     return seat_eyes(moved, generic)

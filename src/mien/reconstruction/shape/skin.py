@@ -12,7 +12,7 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.mesh import Mesh
 from mien.reconstruction.dense.surface import cotangent_laplacian
-from mien.reconstruction.observations import Sightings, measure_misses
+from mien.reconstruction.observations import SurfaceObservations, reproject
 
 BENDING = 12.0
 """How stiff skin is: weight (mm^2) of its squared mean bending against squared distances over their
@@ -26,7 +26,7 @@ _ROUNDS = 3
 
 def move_skin(
     vertices: Float[Array, "v 3"],
-    sightings: Sightings,
+    observations: SurfaceObservations,
     cameras: Sequence[Camera],
     generic: GenericHead,
     *,
@@ -35,7 +35,7 @@ def move_skin(
 ) -> Float[Array, "v 3"]:
     """The head with its skin where the photos show it; what one photo cannot tell stays.
 
-    Minimizes the Cauchy-weighted squared distances of the sightings plus BENDING * bending(d) over
+    Minimizes the Cauchy-weighted squared reprojection errors plus BENDING * bending(d) over
     the movements d of all skin, the mouth's inside included, which goes along over the lips.
 
     Args:
@@ -52,7 +52,7 @@ def move_skin(
     for _ in range(_ROUNDS):
         moved = vertices.copy()
         moved[skin] += moves.reshape(-1, 3)
-        matrix, pull = _normal_equations(moved, sightings, cameras, number)
+        matrix, pull = _normal_equations(moved, observations, cameras, number)
         moves = moves + _solve((matrix + stiffness).tocsc(), pull - stiffness @ moves)
     result = vertices.copy()
     result[skin] += moves.reshape(-1, 3)
@@ -70,26 +70,26 @@ def _solve(matrix: Any, right: Float[Array, " n"]) -> Float[Array, " n"]:
 
 def _normal_equations(
     vertices: Float[Array, "v 3"],
-    sightings: Sightings,
+    observations: SurfaceObservations,
     cameras: Sequence[Camera],
     number: Int[Array, " v"],
 ) -> tuple[Any, Array]:
     """J^T W J and -J^T W r over the skin's movements."""
     from scipy.sparse import csr_array, diags_array
 
-    misses = measure_misses(sightings, sightings.on(vertices) + sightings.beside, cameras)
-    used: Bool[Array, " m"] = np.asarray((number[sightings.corners] >= 0).all(axis=1))
+    errors = reproject(observations, observations.on(vertices) + observations.offset, cameras)
+    used: Bool[Array, " m"] = np.asarray((number[observations.corners] >= 0).all(axis=1))
     count = len(used)
     # Two rows a sighting; in each its place's three corners, each with three movements.
-    by_place = misses.projection.by_place
-    values = sightings.barycentrics[:, None, :, None] * by_place[:, :, None, :]
-    columns = 3 * np.maximum(number[sightings.corners], 0)[:, None, :, None] + np.arange(3)
+    by_place = errors.projection.point_jacobian
+    values = observations.barycentrics[:, None, :, None] * by_place[:, :, None, :]
+    columns = 3 * np.maximum(number[observations.corners], 0)[:, None, :, None] + np.arange(3)
     rows = np.arange(2 * count).reshape(-1, 2)[:, :, None, None]
     rows, columns = (np.broadcast_to(index, values.shape).ravel() for index in (rows, columns))
     shape = (2 * count, 3 * int(number.max() + 1))
     jacobian = csr_array((values.ravel(), (rows, columns)), shape=shape)
-    weighted = diags_array(np.repeat(np.where(used, misses.weights, 0.0), 2)) @ jacobian
-    return jacobian.T @ weighted, -(weighted.T @ misses.residuals.ravel())
+    weighted = diags_array(np.repeat(np.where(used, errors.weights, 0.0), 2)) @ jacobian
+    return jacobian.T @ weighted, -(weighted.T @ errors.residuals.ravel())
 
 
 def _stiffness(

@@ -9,7 +9,7 @@ import numpy as np
 from mien.animate.from_track import FACING
 from mien.arrays import Array, Bool, Float, Int
 from mien.numeric.rotation import angle_between
-from mien.report.page import head_angles
+from mien.report.page import head_angles_deg
 from mien.track.state import Track
 
 
@@ -56,7 +56,7 @@ def series_of(track: Track) -> Series:
     for row, found in enumerate(frames):
         if found.state is not None:
             rotations[row], translations[row] = found.state.R_cam_head, found.state.t_cam_head
-            angles[row] = head_angles(track.camera(found.state))
+            angles[row] = head_angles_deg(track.camera(found.state))
             values[row], deviations[row] = found.state.values, found.deviations
     lost = np.array([found.state is None for found in frames], bool)
     return Series(

@@ -49,7 +49,7 @@ class Composer:
         points = [example.points for example in examples.examples]
         framed = np.stack([self._framed(own, self.head_motion(own)) for own in points])
         self._example_corners = frozen(framed)
-        template = np.concatenate([layout.template, layout.surround])
+        template = np.concatenate([layout.template, layout.template_frame])
         self._triangles = orient_triangles(layout.triangles, template)
         self._standard = examples.standard
         self._blend_weights = pack_blend_weights(examples.subregions.fades)

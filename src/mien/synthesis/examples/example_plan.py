@@ -13,9 +13,9 @@ from mien.arrays import Array, Float, Int
 from mien.assets.feature_points import FeatureLayout
 from mien.assets.subregions import default_subregions
 from mien.capture.faces.face_series import FaceSeries
-from mien.capture.folder import NEUTRAL
 from mien.capture.images.photos import Photo
 from mien.capture.video.frame_selection import FrameScores, choose_frames
+from mien.head import NEUTRAL
 from mien.synthesis.examples.example_set import Example, ExampleSet
 from mien.synthesis.examples.exposure import equalize_exposure
 from mien.synthesis.examples.head_alignment import align_to_neutral

@@ -27,7 +27,7 @@ def feature_points_on(vertices: Float[Array, "*batch v 3"]) -> Float[Array, "*ba
     corners = generic.mesh.triangles[generic.landmark_triangles]
     weights = generic.landmark_barycentrics
     landmarks = np.einsum("...lkc,lk->...lc", np.asarray(vertices)[..., corners, :], weights)
-    return load_feature_layout().mixes @ landmarks
+    return load_feature_layout().landmark_weights @ landmarks
 
 
 def feature_point_matrix() -> Float[Array, "n v"]:
@@ -36,4 +36,4 @@ def feature_point_matrix() -> Float[Array, "n v"]:
     landmarks = np.zeros((len(generic.landmark_triangles), len(generic.mesh.vertices)))
     corners = generic.mesh.triangles[generic.landmark_triangles]
     np.put_along_axis(landmarks, corners, generic.landmark_barycentrics, axis=1)
-    return load_feature_layout().mixes @ landmarks
+    return load_feature_layout().landmark_weights @ landmarks

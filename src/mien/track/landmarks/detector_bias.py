@@ -182,7 +182,7 @@ def viewpoint(
 def viewpoint_slopes(
     R_cam_head: Float[Array, "3 3"], t_cam_head: Float[Array, " 3"]
 ) -> Float[Array, "3 6"]:
-    """Derivatives of the viewpoint by the pose (reconstruction.dense.projection's UNKNOWNS)."""
+    """Derivatives of the viewpoint by the pose (reconstruction.bundle.projection)."""
     distance = float(np.linalg.norm(t_cam_head))
     towards = t_cam_head / distance
     slopes = np.zeros((3, 6))

@@ -13,7 +13,7 @@ from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES, DetectedFace
 from mien.numeric.rotation import rotation_from_vector
 from mien.numeric.solvers.levenberg_marquardt import minimize_lm
 from mien.numeric.solvers.robust import loss_named
-from mien.reconstruction.dense.projection import UNKNOWNS, Pinholes, project_places
+from mien.reconstruction.bundle.projection import CAMERA_SIZE, PinholeArrays, project_points
 from mien.track.landmarks.detector_bias import facing_share, viewpoint, viewpoint_slopes
 from mien.track.landmarks.model import Marks
 from mien.track.state import Layout
@@ -32,7 +32,7 @@ _SUM_SD = 0.05
 """How far a region's weights exceed 1 together."""
 _SPARING = 1.0
 """Price of a whole weight, so that few expressions are mixed where many would do."""
-_POSE = UNKNOWNS - 1
+_POSE = CAMERA_SIZE - 1
 _ROUNDS = 12
 _TOLERANCE = 1e-4
 _FACE = slice(_POSE, None)
@@ -142,7 +142,7 @@ class Measured:
     """How N landmarks lie off, with derivatives.
 
     Attributes:
-        by_camera: (N, 2, 7) by the UNKNOWNS of a camera.
+        by_camera: (N, 2, 7) by the CAMERA_SIZE of a camera.
         by_place: (N, 2, 3) px / mm.
         residuals: (N, 2) px.
         weights: (N,) 1 / px^2.
@@ -201,15 +201,15 @@ class MarkProblem:
     def measured(self, guess: Guess) -> Measured:
         """The landmarks at a guess. Raises: EstimationError: one lies behind the camera."""
         seen = self._seen
-        camera = Pinholes(guess.R[None], guess.t[None], np.array([self._focal]))
-        projection = project_places(camera, self._nowhere, seen.on(guess))
+        camera = PinholeArrays(guess.R[None], guess.t[None], np.array([self._focal]))
+        projection = project_points(camera, self._nowhere, seen.on(guess))
         residuals = projection.image_points - seen.image_points
         _, share = loss_named("cauchy")((residuals**2).sum(axis=1) / self._sigma_px**2)
         weights = share / (ALIKE * self._sigma_px**2)
-        by_camera = projection.by_camera()
+        by_camera = projection.camera_jacobian()
         slopes = viewpoint_slopes(guess.R, guess.t)
-        by_camera[..., :_POSE] += projection.by_place @ (seen.drift @ slopes)
-        return Measured(by_camera, projection.by_place, residuals, weights)
+        by_camera[..., :_POSE] += projection.point_jacobian @ (seen.drift @ slopes)
+        return Measured(by_camera, projection.point_jacobian, residuals, weights)
 
     def normal_equations(self, guess: Guess) -> tuple[Array, Array]:
         """(7 + P, 7 + P) and (7 + P,): Hessian and gradient over pose, log focal and face.
@@ -218,7 +218,7 @@ class MarkProblem:
             EstimationError: a landmark lies behind the camera.
         """
         hessian, gradient = self.measured(guess).normal_equations(self._seen.moves)
-        self.add_belief(guess.face, hessian[UNKNOWNS:, UNKNOWNS:], gradient[UNKNOWNS:])
+        self.add_belief(guess.face, hessian[CAMERA_SIZE:, CAMERA_SIZE:], gradient[CAMERA_SIZE:])
         return hessian, gradient
 
     def add_belief(self, face: Array, hessian: Array, gradient: Array) -> None:
@@ -251,7 +251,7 @@ def fit_face(seen: Observation, layout: Layout, focal_px: float, *, start: Guess
         EstimationError: a landmark comes to lie behind the camera.
     """
     problem = MarkProblem(seen, layout, focal_px, near=start)
-    known = np.arange(UNKNOWNS + len(start.face)) != _POSE  # The focal length.
+    known = np.arange(CAMERA_SIZE + len(start.face)) != _POSE  # The focal length.
 
     def linearize(guess: Guess) -> Callable[[float], tuple[Array, float]]:
         hessian, gradient = problem.normal_equations(guess)

@@ -15,7 +15,7 @@ from mien.errors import EstimationError, InputError
 from mien.head import Head
 from mien.numeric.rotation import angle_between
 from mien.numeric.solvers.schur import BlockSystem
-from mien.reconstruction.dense.projection import UNKNOWNS
+from mien.reconstruction.bundle.projection import CAMERA_SIZE
 from mien.track.landmarks.detector_bias import at_landmarks
 from mien.track.landmarks.fit import MOST, Guess, MarkProblem, Observation, fit_face
 from mien.track.landmarks.initialization import Found, Starter
@@ -36,7 +36,7 @@ _LEAST_ROUNDS, _MOST_ROUNDS, _SETTLED, _FARTHEST = 3, 8, 0.01, 0.5
 _CLOSELY = 5
 """Every so many frames that show no face of the head's, faces are sought that are too small to be
 found in the whole picture."""
-_FOCAL = UNKNOWNS - 1
+_FOCAL = CAMERA_SIZE - 1
 _LITTLE = 0.7
 
 
@@ -205,7 +205,7 @@ class FocalEstimator:
         off_in_frame = self._off_in_frame[seen.kept]
         moves = [seen.moves, off_in_frame, self._off_in_common[seen.kept]]
         hessian, gradient = problem.measured(guess).normal_equations(np.concatenate(moves, axis=2))
-        face = slice(UNKNOWNS, UNKNOWNS + len(guess.face))
+        face = slice(CAMERA_SIZE, CAMERA_SIZE + len(guess.face))
         problem.add_belief(guess.face, hessian[face, face], gradient[face])
         own = np.arange(face.stop, face.stop + off_in_frame.shape[2])
         hessian[own, own] += 1

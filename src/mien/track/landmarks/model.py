@@ -15,7 +15,8 @@ import numpy as np
 
 from mien.arrays import Array, Float, frozen
 from mien.assets.generic import GenericHead, load_generic_head
-from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES, LANDMARK_COUNT
+from mien.assets.landmark_sets import LANDMARK_COUNT
+from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
 from mien.mesh import Mesh
 from mien.rig.rig import Rig
 from mien.rig.state import FACE, FaceState
