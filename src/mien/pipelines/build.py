@@ -24,9 +24,9 @@ from mien.reconstruction.expression.known_head import KnownHead
 from mien.reconstruction.fit import Fit, FitOptions, fit_views
 from mien.render.picture import turntable_frames
 from mien.report import ReportInput, render_report
-from mien.rig.contacts.contacts import Contacts, fit_units
-from mien.rig.contacts.lip_closing import meet_lips
-from mien.rig.expression_textures import Photographed, paint_expressions
+from mien.rig.contacts.lips import close_lips
+from mien.rig.deformer import Contacts, fit_units
+from mien.rig.expression_textures import ExpressionPhotos, extract_expression_textures
 from mien.rig.gaze import with_turned_eyes
 from mien.rig.regions import default_masks
 from mien.texture.atlas import atlas_surface
@@ -159,7 +159,7 @@ def _fit_all(
 
     tell(SOLVING, 0, count)
     neutral = fit_views(capture.expressions[NEUTRAL], generic, options.fit, progress=part(0))
-    neutral = replace(neutral, vertices=meet_lips(generic, neutral.vertices))
+    neutral = replace(neutral, vertices=close_lips(generic, neutral.vertices))
     fits: dict[str, Fit | ExpressionFit] = {NEUTRAL: neutral}
     views = [view for view in capture.expressions[NEUTRAL] if view.photo.name in neutral.photos]
     cameras = [neutral.photos[view.photo.name].camera for view in views]
@@ -175,7 +175,7 @@ def _fit_all(
         except EstimationError as error:
             notes.append(f"{name}: left out: {error}")
             continue
-        fits[name] = replace(fit, vertices=contacts.resolved(fit.vertices))
+        fits[name] = replace(fit, vertices=contacts.resolve(fit.vertices))
     tell(SOLVING, count, count)
     fitted = {name: capture.expressions[name] for name in fits}
     return replace(capture, expressions=fitted, notes=(*capture.notes, *notes)), fits, units
@@ -251,14 +251,14 @@ def _with_textures(
     tell(stage, 1, total)
     photos = _photos(capture)
     photographed = {
-        name: Photographed(
+        name: ExpressionPhotos(
             item.vertices,
             [view.camera for view in item.views],
             [photos[view.photo] for view in item.views],
         )
         for name, item in head.expressions.items()
     }
-    looks = paint_expressions(head.mesh, photographed, base.pixels, load_generic_head())
+    looks = extract_expression_textures(head.mesh, photographed, base.pixels, load_generic_head())
     tell(stage, 2, total)
     around = cylinder_surface(head.mesh, fit_cylinder(head.mesh), parts=("skin",))
     cylinder = _extract(head, capture, NEUTRAL, around, options.fill)

@@ -16,7 +16,7 @@ SIDES = ("left", "right")
 _LAG = 0.35
 """Of a gaze beyond what the units know, lids follow this share: they would close before it."""
 _WAYS = ("Down", "In", "Out", "Up")
-LOOK_UNITS = tuple(f"eyeLook{way}{side.capitalize()}" for way in _WAYS for side in SIDES)
+EYE_LOOK_UNITS = tuple(f"eyeLook{way}{side.capitalize()}" for way in _WAYS for side in SIDES)
 """The units that turn the eyeballs."""
 
 
@@ -95,13 +95,13 @@ def _turn(inverse: Array, yaw: float, pitch: float) -> Array:
     return turn
 
 
-def look_angles(generic: GenericHead) -> dict[str, tuple[float, float]]:
+def eye_look_angles(generic: GenericHead) -> dict[str, tuple[float, float]]:
     """Yaw and pitch, radians, by which each eyeLook unit turns its eyeball at weight 1.
 
     They are those of the rotation nearest to the generic unit's offsets.
     """
     angles = {}
-    for name in LOOK_UNITS:
+    for name in EYE_LOOK_UNITS:
         ball = part_vertices(generic, f"{_side(name)}_eyeball")
         places = generic.mesh.vertices[ball]
         moved = places + generic.unit_offsets[generic.unit_names.index(name)][ball]
@@ -123,7 +123,7 @@ def turn_eyeballs(
     At weight 1 an eyeLook unit ends where the turn ends; in between it cuts the corner.
     """
     result = units.copy()
-    for name, (yaw, pitch) in look_angles(generic).items():
+    for name, (yaw, pitch) in eye_look_angles(generic).items():
         eyeball = Eyeball.of(generic, vertices, _side(name))
         places = vertices[eyeball.vertices]
         offsets = eyeball.turned(places, yaw, pitch) - places
@@ -143,12 +143,12 @@ def with_turned_eyes(
 
 
 @dataclass(frozen=True)
-class Look:
+class GazeModel:
     """How the eyes of one head look around.
 
     Attributes:
         eyeballs: left and right.
-        units: (8,) which of the head's units are the eyeLook units, in the order of LOOK_UNITS.
+        units: (8,) which of the head's units are the eyeLook units, in the order of EYE_LOOK_UNITS.
         angles: (8, 2) yaw and pitch, radians, of the eyeballs at weight 1 of these.
     """
 
@@ -157,15 +157,15 @@ class Look:
     angles: Float[Array, "8 2"]
 
     @staticmethod
-    def of(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Look:
+    def of(generic: GenericHead, vertices: Float[Array, "v 3"]) -> GazeModel:
         """For a head with these neutral vertices, mm."""
         left, right = (Eyeball.of(generic, vertices, side) for side in SIDES)
-        chosen = [generic.unit_names.index(name) for name in LOOK_UNITS]
-        angles = look_angles(generic)
-        return Look(
+        chosen = [generic.unit_names.index(name) for name in EYE_LOOK_UNITS]
+        angles = eye_look_angles(generic)
+        return GazeModel(
             (left, right),
             frozen(np.array(chosen)),
-            frozen(np.array([angles[name] for name in LOOK_UNITS])),
+            frozen(np.array([angles[name] for name in EYE_LOOK_UNITS])),
         )
 
     def without_eyeballs(self, units: Float[Array, "52 v 3"]) -> Float[Array, "52 v 3"]:

@@ -11,7 +11,7 @@ from mien.assets.generic import GenericHead
 from mien.errors import InputError
 from mien.rig.state import FACE
 
-AROUND: Mapping[str, tuple[str, ...]] = {
+ENCLOSING_REGIONS: Mapping[str, tuple[str, ...]] = {
     FACE: (),
     "mouth": (FACE,),
     "eyes": (FACE,),
@@ -25,7 +25,14 @@ AROUND: Mapping[str, tuple[str, ...]] = {
 }
 """All regions by name, and those around each from the nearest on."""
 
-MASKS = ("left_mouth", "right_mouth", "left_eye", "right_eye", "left_forehead", "right_forehead")
+MASK_NAMES = (
+    "left_mouth",
+    "right_mouth",
+    "left_eye",
+    "right_eye",
+    "left_forehead",
+    "right_forehead",
+)
 """The regions that have masks; the others are made of them. The rest of the head is the face's."""
 
 _MIDLINE_MM = 12.0
@@ -45,7 +52,7 @@ _PARTS = {
 
 
 def default_masks(generic: GenericHead) -> dict[str, Float[Array, " v"]]:
-    """(V,) in [0, 1] by name of MASKS: a partition of the face with soft borders.
+    """(V,) in [0, 1] by name of MASK_NAMES: a partition of the face with soft borders.
 
     What lies behind the lips, the nostrils and the lids goes with them, as do teeth and tongue,
     lashes and eyes. The border between eyes and forehead runs below the brows: across them, two
@@ -70,7 +77,7 @@ def default_masks(generic: GenericHead) -> dict[str, Float[Array, " v"]]:
         half = "eye" if name == "eyes" else name
         masks[f"left_{half}"] = left * mask / total
         masks[f"right_{half}"] = (1 - left) * mask / total
-    return {name: masks[name] for name in MASKS}
+    return {name: masks[name] for name in MASK_NAMES}
 
 
 def _above_lids(generic: GenericHead) -> Float[Array, " v"]:
@@ -99,7 +106,7 @@ def _rising(x: Float[Array, " n"], y: Float[Array, " n"]) -> tuple[Array, Array]
 
 
 def check_masks(masks: Mapping[str, object], vertices: int) -> dict[str, Float[Array, " v"]]:
-    """(V,) masks by name, in the order of MASKS, scaled down where they sum to more than 1.
+    """(V,) masks by name, in the order of MASK_NAMES, scaled down where they sum to more than 1.
 
     A region that is left out has an empty mask: the face's weights hold there.
 
@@ -107,10 +114,10 @@ def check_masks(masks: Mapping[str, object], vertices: int) -> dict[str, Float[A
         InputError: an unknown name, another shape, values outside [0, 1].
     """
     for name in masks:
-        if name not in MASKS:
-            raise InputError("regions", f"names of {', '.join(MASKS)}", name)
+        if name not in MASK_NAMES:
+            raise InputError("regions", f"names of {', '.join(MASK_NAMES)}", name)
     checked = {}
-    for name in MASKS:
+    for name in MASK_NAMES:
         mask = check_array(f"region {name}", masks.get(name, np.zeros(vertices)), (vertices,))
         if mask.min(initial=0) < 0 or mask.max(initial=0) > 1:
             found = f"{mask.min():g} to {mask.max():g}"

@@ -13,15 +13,15 @@ from mien.errors import InputError
 from mien.head import NEUTRAL, Head
 from mien.limits import UNIT_RANGE
 from mien.rig.basis import WEIGHT_RANGE, check_weights, outside_hull
-from mien.rig.contacts.contacts import Mechanics
+from mien.rig.deformer import FaceDeformer
 from mien.rig.followers import part_vertices
-from mien.rig.regions import AROUND, MASKS, check_masks, default_masks
-from mien.rig.shading import Openings, brightness_at
+from mien.rig.regions import ENCLOSING_REGIONS, MASK_NAMES, check_masks, default_masks
+from mien.rig.shading import OpeningMeter, brightness_at
 from mien.rig.sparse_offsets import add_mixture
 from mien.rig.state import FACE, FaceState, PosedFace
-from mien.rig.unit_decomposition import Explanations
+from mien.rig.unit_decomposition import UnitDecomposition
 
-REGIONS = (*MASKS, FACE)
+WEIGHTED_REGIONS = (*MASK_NAMES, FACE)
 """Those that have weights of their own in the end; the face's hold in the rest of the head."""
 
 
@@ -54,21 +54,21 @@ class Rig:
         self._neutral = np.asarray(head.mesh.vertices, np.float64)
         units = np.asarray(head.units, np.float64)
         masks = check_masks(head.regions or default_masks(generic), len(self._neutral))
-        by_mask = np.stack([masks[name] for name in MASKS], axis=1)
+        by_mask = np.stack([masks[name] for name in MASK_NAMES], axis=1)
         self._shares = np.column_stack([by_mask, 1 - by_mask.sum(axis=1)])
         expressions = [head.expressions[name] for name in self.names]
         self._gaze = np.stack([item.gaze for item in expressions])
-        self._mechanics = Mechanics.of(generic, self._neutral, units)
+        self._deformer = FaceDeformer.of(generic, self._neutral, units)
         self.offsets = np.stack(
             [self._still_eyes(item.vertices) - self._neutral for item in expressions]
         )
-        self._explained = Explanations.of(
+        self._decomposition = UnitDecomposition.of(
             np.array([[item.units.get(n, 0.0) for n in self.unit_names] for item in expressions]),
             units,
             self.offsets,
             by_mask,
         )
-        self._openings = Openings.of(generic, self._neutral)
+        self._openings = OpeningMeter.of(generic, self._neutral)
         self._shading = head.shading
         self._photographed = np.stack([item.vertices for item in expressions])
         openings = np.stack([self._openings.measure(item) for item in self._photographed])
@@ -76,7 +76,7 @@ class Rig:
         self._shaded = _shaded_parts(generic)
         # Where eyes look in a photograph has nothing to do with the units that it shows.
         self._skin_shares = self._shares.copy()
-        for eyeball in self._mechanics.look.eyeballs:
+        for eyeball in self._deformer.gaze_model.eyeballs:
             self._skin_shares[eyeball.vertices] = 0
 
     def evaluate(self, state: FaceState, *, contacts: bool = True) -> PosedFace:
@@ -105,7 +105,7 @@ class Rig:
         """What evaluate makes of a state, from its numbers; they are not checked.
 
         Args:
-            by_region: weights of the expressions in each of REGIONS.
+            by_region: weights of the expressions in each of WEIGHTED_REGIONS.
             units: weights.
             gaze: yaw and pitch, radians.
         """
@@ -114,12 +114,12 @@ class Rig:
         if not moved and _one_expression(by_region):
             return self._as_photographed(weights)
         vertices = self._mixed(weights)
-        driven = self._explained.driven(units) * np.clip(by_region[:, :1], 0, 1)
+        driven = self._decomposition.expression_weights(units) * np.clip(by_region[:, :1], 0, 1)
         if driven.any():
             along = self._skin_shares @ np.column_stack([-driven.sum(axis=1), driven])
-            add_mixture(along[:, 1:], self._explained.left_over[1:], vertices)
+            add_mixture(along[:, 1:], self._decomposition.residuals[1:], vertices)
             weights += along
-        vertices = self._mechanics.applied(vertices, units, gaze, contacts=contacts)
+        vertices = self._deformer.deform(vertices, units, gaze, contacts=contacts)
         return PosedFace(vertices, weights, self._brightness(vertices, weights))
 
     def mixed(
@@ -149,11 +149,11 @@ class Rig:
             return self._as_photographed(weights)
         vertices = self._mixed(weights)
         if turn is not None:
-            self._mechanics.look.turn(vertices, check_array("turn", turn, (2, 2)))
+            self._deformer.gaze_model.turn(vertices, check_array("turn", turn, (2, 2)))
         if offsets is not None:
             vertices += check_array("offsets", offsets, vertices.shape)
         still = np.zeros(len(self.unit_names))
-        vertices = self._mechanics.applied(vertices, still, contacts=contacts)
+        vertices = self._deformer.deform(vertices, still, contacts=contacts)
         return PosedFace(vertices, weights, self._brightness(vertices, weights))
 
     def mask(self, region: str) -> Float[Array, " v"]:
@@ -162,8 +162,8 @@ class Rig:
         Raises:
             InputError: an unknown region.
         """
-        _check_known("region", region, AROUND)
-        inside = [region in (name, *AROUND[name]) for name in MASKS]
+        _check_known("region", region, ENCLOSING_REGIONS)
+        inside = [region in (name, *ENCLOSING_REGIONS[name]) for name in MASK_NAMES]
         return self._shares[:, [*inside, region == FACE]].sum(axis=1)
 
     def hull_notes(self, state: FaceState) -> tuple[str, ...]:
@@ -181,7 +181,7 @@ class Rig:
     def _region_weights(
         self, expressions: Mapping[str, Mapping[str, float]]
     ) -> Float[Array, "r k"]:
-        """(R, K) weights in each of REGIONS."""
+        """(R, K) weights in each of WEIGHTED_REGIONS."""
         rows = region_rows(tuple(expressions))
         own = [self._weights({}), *(self._weights(given) for given in expressions.values())]
         return np.array(own)[rows]
@@ -214,7 +214,7 @@ class Rig:
     def _still_eyes(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
         """The expression with its eyeballs as in neutral: they are turned, not mixed."""
         still = np.array(vertices, np.float64)
-        for eyeball in self._mechanics.look.eyeballs:
+        for eyeball in self._deformer.gaze_model.eyeballs:
             still[eyeball.vertices] = self._neutral[eyeball.vertices]
         return still
 
@@ -233,7 +233,7 @@ class Rig:
         self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
     ) -> None:
         """Turns the eyes in place by the mean of where they look in the photographs."""
-        look = self._mechanics.look
+        look = self._deformer.gaze_model
         balls = [eyeball.vertices[0] for eyeball in look.eyeballs]
         look.turn(vertices, np.einsum("sk,ksa->sa", weights[balls], self._gaze))
 
@@ -250,15 +250,16 @@ class Rig:
 
 
 def region_rows(regions: Sequence[str]) -> Int[Array, " r"]:
-    """(R,) which of these regions each of REGIONS obeys, counted from 1; 0 for none.
+    """(R,) which of these regions each of WEIGHTED_REGIONS obeys, counted from 1; 0 for none.
 
     Raises:
         InputError: an unknown region.
     """
     for region in regions:
-        _check_known("region", region, AROUND)
+        _check_known("region", region, ENCLOSING_REGIONS)
     nearest = (
-        next((name for name in (own, *AROUND[own]) if name in regions), None) for own in REGIONS
+        next((name for name in (own, *ENCLOSING_REGIONS[own]) if name in regions), None)
+        for own in WEIGHTED_REGIONS
     )
     return np.array([0 if name is None else 1 + regions.index(name) for name in nearest])
 

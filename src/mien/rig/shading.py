@@ -16,7 +16,7 @@ EYES, TEETH = "eyes", "teeth"
 Polynomial = tuple[float, float, float]
 """c0 + c1 o + c2 o^2, the brightness at an opening o."""
 
-MOST_OPEN = {EYES: 1.6, TEETH: 0.4}
+MAX_OPENING = {EYES: 1.6, TEETH: 0.4}
 """Beyond, brightness stays."""
 _PRIOR_SD = (0.15, 0.6, 0.6)
 """How far a person's coefficients lie off the usual ones."""
@@ -27,7 +27,7 @@ _RANGE = (0.25, 1.5)
 
 
 @dataclass(frozen=True)
-class Openings:
+class OpeningMeter:
     """How far eyes and mouth are open, for heads of one topology and one person.
 
     Attributes:
@@ -43,7 +43,7 @@ class Openings:
     neutral: Float[Array, " 2"]
 
     @classmethod
-    def of(cls, generic: GenericHead, vertices: Float[Array, "v 3"]) -> Openings:
+    def of(cls, generic: GenericHead, vertices: Float[Array, "v 3"]) -> OpeningMeter:
         """For a person with these neutral vertices, (V, 3) mm."""
         lines = generic.polylines
         lids = tuple(
@@ -68,7 +68,7 @@ def brightness_at(
     """Brightness of the left eye, the right eye and the teeth at these openings."""
     parts = (EYES, EYES, TEETH)
     c0, c1, c2 = np.array([polynomials[part] for part in parts]).T
-    o = np.clip(openings, 0, [MOST_OPEN[part] for part in parts])
+    o = np.clip(openings, 0, [MAX_OPENING[part] for part in parts])
     return np.clip(c0 + o * (c1 + o * c2), *_RANGE)
 
 
@@ -85,11 +85,11 @@ def fit_polynomial(part: str, measured: Sequence[tuple[float, float, float]]) ->
     """
     usual, spread = np.array(SHADING[part]), np.array(_PRIOR_SD)
     table = np.array(measured, float).reshape(-1, 3)
-    at, other = (np.clip(table[:, k], 0, MOST_OPEN[part]) for k in (0, 1))
+    at, other = (np.clip(table[:, k], 0, MAX_OPENING[part]) for k in (0, 1))
     # ratio = p(o) / p(other): linear in the coefficients once multiplied out.
     rows = at[:, None] ** np.arange(3) - table[:, 2:] * other[:, None] ** np.arange(3)
     # Ratios do not tell the scale, which is that of the usual polynomial, wide open.
-    wide = MOST_OPEN[part] ** np.arange(3)
+    wide = MAX_OPENING[part] ** np.arange(3)
     normal = rows.T @ rows / _NOISE**2 + np.outer(wide, wide) / _SCALE_SD**2 + np.diag(spread**-2)
     right = usual / spread**2 + wide * (wide @ usual) / _SCALE_SD**2
     c0, c1, c2 = np.linalg.solve(normal, right).tolist()

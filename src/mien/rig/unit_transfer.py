@@ -14,8 +14,8 @@ from scipy.sparse import coo_matrix, csr_matrix, diags
 
 from mien.arrays import Array, Bool, Float, Int, check_array
 from mien.assets.generic import GenericHead
-from mien.rig.contacts.margins import full_path, skin_edges
 from mien.rig.followers import Followers, part_vertices
+from mien.rig.skin_paths import shortest_path, skin_edges
 
 _REACH_MM = 12.0
 """Standard deviation of the neighbourhood over which the stretch of a head is judged."""
@@ -181,7 +181,7 @@ def _links(generic: GenericHead) -> Int[Array, "l 2"]:
     edges = skin_edges(generic, places)
     pairs = []
     for opening in _OPENINGS:
-        upper, lower = (full_path(edges, generic.polylines[name])[1:-1] for name in opening)
+        upper, lower = (shortest_path(edges, generic.polylines[name])[1:-1] for name in opening)
         for line, other in ((upper, lower), (lower, upper)):
             nearest = other[cKDTree(places[other]).query(places[line])[1]]
             pairs.append(np.column_stack([line, nearest]))

@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 from mien.arrays import Array, Bool, Float, Int, frozen
 from mien.assets.generic import GenericHead
 from mien.numeric.signed_distance import penetration_depths
-from mien.rig.contacts.margins import distances_from, fading, full_path, skin_edges
+from mien.rig.skin_paths import cosine_falloff, geodesic_distances, shortest_path, skin_edges
 
 _PATCH_MM = 14.0
 """Skin so near to the line where the lips meet is lip, front and back."""
@@ -24,6 +24,11 @@ _STEP = 0.6
 _STEEPEST = 0.5
 """The way up counts as no longer than twice the nearest way out."""
 _ROUNDS = 4
+CLOSED_MM = 2.0
+"""A mouth whose lips are less far apart in the middle is closed."""
+_OPEN_MM = 4.0
+"""Where a closed mouth's lips are so far apart they are left alone."""
+_CLOSING_SPREAD_MM = 7.0
 
 
 @dataclass(frozen=True)
@@ -61,10 +66,10 @@ class Lips:
         """For a head with these neutral vertices, (V, 3) mm: what touches now may go on so."""
         edges = skin_edges(generic, generic.mesh.vertices)
         upper, lower = (
-            full_path(edges, generic.polylines[f"{which}_lip_inner"])
+            shortest_path(edges, generic.polylines[f"{which}_lip_inner"])
             for which in ("upper", "lower")
         )
-        distance, nearest = distances_from(edges, np.concatenate([upper, lower[1:-1]]))
+        distance, nearest = geodesic_distances(edges, np.concatenate([upper, lower[1:-1]]))
         first, second = (
             _lip(generic, edges, np.where(np.isin(nearest, line[1:-1]), distance, np.inf), upwards)
             for line, upwards in ((upper, 1.0), (lower, -1.0))
@@ -93,15 +98,18 @@ def resolve_lips(
     """
     upper, lower = lips.upper, lips.lower
     places = above, below = vertices[upper.vertices], vertices[lower.vertices]
-    up, down = _ways_out(upper, above, lower, below), _ways_out(lower, below, upper, above)
+    up, down = _corrections(upper, above, lower, below), _corrections(lower, below, upper, above)
     if not (up.any() or down.any()):
         return None
     # Where nothing touches and nothing moves, nothing will touch.
-    near_up, near_down = _around(upper, up), _around(lower, down)
+    near_up, near_down = _neighbours(upper, up), _neighbours(lower, down)
     for _ in range(rounds):
-        above, below = above + _spread(upper, up), below + _spread(lower, down)
-        up = _ways_out(upper, above, lower, below, near_up)
-        down = _ways_out(lower, below, upper, above, near_down)
+        above, below = (
+            above + _spread_corrections(upper, up),
+            below + _spread_corrections(lower, down),
+        )
+        up = _corrections(upper, above, lower, below, near_up)
+        down = _corrections(lower, below, upper, above, near_down)
         if not (up.any() or down.any()):
             break
     moved = np.zeros_like(vertices)
@@ -110,7 +118,7 @@ def resolve_lips(
     return moved
 
 
-def part_lips(
+def separate_lips(
     generic: GenericHead, vertices: Float[Array, "v 3"], units: Float[Array, "52 v 3"]
 ) -> Float[Array, "52 v 3"]:
     """The units with lips that are not in each other at weight 1.
@@ -128,11 +136,11 @@ def part_lips(
         posed = vertices + result[unit]
         if unit == close:
             posed = posed + result[jaw]
-        result[unit] += _apart(lips, posed) - posed
+        result[unit] += _separated(lips, posed) - posed
     return result
 
 
-def _apart(lips: Lips, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
+def _separated(lips: Lips, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
     """(V, 3) mm with lips that are not in each other, however long that takes."""
     for _ in range(_ROUNDS):
         moved = resolve_lips(lips, vertices, rounds=4 * _ROUNDS)
@@ -159,19 +167,19 @@ def _lip(
         triangles=frozen(triangles),
         border=frozen(np.isin(vertices, skin[~inside])),
         tested=frozen(tested),
-        spread=frozen(_spreading(edges, vertices, tested)),
+        spread=frozen(_spread_weights(edges, vertices, tested)),
         allowed=frozen(np.zeros(len(tested))),
         upwards=upwards,
     )
 
 
-def _spreading(
+def _spread_weights(
     edges: csr_matrix, vertices: Int[Array, " p"], tested: Int[Array, " t"]
 ) -> Float[Array, "p t"]:
     from scipy.sparse.csgraph import dijkstra
 
     along = dijkstra(edges[vertices][:, vertices], indices=tested, limit=_SPREAD_MM)
-    return fading(along.T, _SPREAD_MM)
+    return cosine_falloff(along.T, _SPREAD_MM)
 
 
 def _allowing(lip: Lip, depth: Float[Array, " t"]) -> Lip:
@@ -181,19 +189,19 @@ def _allowing(lip: Lip, depth: Float[Array, " t"]) -> Lip:
 def _depths(upper: Lip, lower: Lip, vertices: Float[Array, "v 3"]) -> tuple[Array, Array]:
     above, below = vertices[upper.vertices], vertices[lower.vertices]
     return (
-        _into(above[upper.tested], lower, below)[0],
-        _into(below[lower.tested], upper, above)[0],
+        _penetration(above[upper.tested], lower, below)[0],
+        _penetration(below[lower.tested], upper, above)[0],
     )
 
 
-def _into(
+def _penetration(
     points: Float[Array, "n 3"], lip: Lip, places: Float[Array, "p 3"]
 ) -> tuple[Array, Array, Array]:
     """Depth of points in a lip whose vertices are at these places, and the nearest places on it."""
     return penetration_depths(points, places, lip.triangles, lip.border, _DEEPEST_MM)
 
 
-def _ways_out(
+def _corrections(
     lip: Lip,
     places: Float[Array, "p 3"],
     other: Lip,
@@ -201,33 +209,83 @@ def _ways_out(
     among: Int[Array, " n"] | None = None,
 ) -> Float[Array, "t 3"]:
     """(T, 3) mm by which the tested vertices (only those `among` them) give way."""
-    ways = np.zeros((len(lip.tested), 3))
+    corrections = np.zeros((len(lip.tested), 3))
     among = np.arange(len(lip.tested)) if among is None else among
     points = places[lip.tested[among]]
-    depth, triangle, weights = _into(points, other, others)
+    depth, triangle, weights = _penetration(points, other, others)
     deep = np.flatnonzero(depth - lip.allowed[among] > _TOLERANCE_MM)
     if not len(deep):
-        return ways
+        return corrections
     corners = others[other.triangles[triangle[deep]]]
     nearest = (weights[deep][..., None] * corners).sum(axis=1)
     rise = lip.upwards * (nearest - points[deep])[:, 1] / depth[deep]
     excess = depth[deep] - lip.allowed[among[deep]]
-    ways[among[deep], 1] = lip.upwards * _STEP * excess / np.maximum(rise, _STEEPEST)
-    return ways
+    corrections[among[deep], 1] = lip.upwards * _STEP * excess / np.maximum(rise, _STEEPEST)
+    return corrections
 
 
-def _around(lip: Lip, ways: Float[Array, "t 3"]) -> Int[Array, " n"]:
+def _neighbours(lip: Lip, corrections: Float[Array, "t 3"]) -> Int[Array, " n"]:
     """The tested vertices that go along with those that give way."""
-    hit = ways.any(axis=1)
+    hit = corrections.any(axis=1)
     return np.flatnonzero(lip.spread[np.ix_(lip.tested, hit)].any(axis=1))
 
 
-def _spread(lip: Lip, ways: Float[Array, "t 3"]) -> Float[Array, "p 3"]:
+def _spread_corrections(lip: Lip, corrections: Float[Array, "t 3"]) -> Float[Array, "p 3"]:
     """(P, 3) the weighted mean of the corrections around, fading where there are none."""
-    chosen = np.flatnonzero(ways.any(axis=1))
+    chosen = np.flatnonzero(corrections.any(axis=1))
     if not len(chosen):
         return np.zeros((len(lip.vertices), 3))
     near = lip.spread[:, chosen]
     most = near.max(axis=1)
     share = most / np.maximum(near.sum(axis=1), 1e-12)
-    return (near @ ways[chosen]) * share[:, None]
+    return (near @ corrections[chosen]) * share[:, None]
+
+
+def close_lips(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
+    """The head with lips that meet, half of the gap from either side; an open mouth stays open.
+
+    The generic head's lips are apart by a hair at the corners, and what a photo shows of closed
+    lips is one line. They move up and down alone: one lip may lie before the other.
+
+    Args:
+        vertices: (V, 3) mm.
+    """
+    edges = skin_edges(generic, generic.mesh.vertices)
+    lines = [
+        shortest_path(edges, generic.polylines[f"{which}_lip_inner"])
+        for which in ("upper", "lower")
+    ]
+    upper, lower = (vertices[line] for line in lines)
+    middle = np.array([0.5])
+    if (_points_along(upper, middle) - _points_along(lower, middle))[0, 1] > CLOSED_MM:
+        return vertices
+    sources = np.concatenate([lines[0], lines[1][1:-1]])
+    moves = np.concatenate([_halfway(upper, lower), _halfway(lower, upper)[1:-1]])
+    distance, nearest = geodesic_distances(edges, sources)
+    carried = np.zeros_like(vertices)
+    index: Int[Array, " v"] = np.full(len(vertices), -1)
+    index[sources] = np.arange(len(sources))
+    near = np.flatnonzero(distance < _CLOSING_SPREAD_MM)
+    carried[near] = (
+        cosine_falloff(distance[near], _CLOSING_SPREAD_MM)[:, None] * moves[index[nearest[near]]]
+    )
+    return vertices + carried
+
+
+def _halfway(line: Float[Array, "n 3"], other: Float[Array, "m 3"]) -> Float[Array, "n 3"]:
+    """(N, 3) mm up or down from each vertex of a lip's edge to halfway to the other lip's."""
+    gap = (_points_along(other, _arc_fractions(line)) - line)[:, 1]
+    share = np.clip((_OPEN_MM - np.abs(gap)) / (_OPEN_MM - CLOSED_MM), 0, 1)
+    return np.outer(gap / 2 * share, [0.0, 1.0, 0.0])
+
+
+def _arc_fractions(line: Float[Array, "n 3"]) -> Float[Array, " n"]:
+    """From 0 to 1 by the length along a line."""
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    return length / max(float(length[-1]), 1e-9)
+
+
+def _points_along(line: Float[Array, "n 3"], fractions: Float[Array, " m"]) -> Float[Array, "m 3"]:
+    at = _arc_fractions(line)
+    return np.column_stack([np.interp(fractions, at, line[:, axis]) for axis in range(3)])

@@ -21,7 +21,7 @@ def skin_edges(generic: GenericHead, vertices: Float[Array, "v 3"]) -> csr_matri
     return coo_matrix((np.concatenate([length, length]), place), (len(vertices),) * 2).tocsr()
 
 
-def full_path(edges: csr_matrix, corners: Sequence[int]) -> Int[Array, " n"]:
+def shortest_path(edges: csr_matrix, corners: Sequence[int]) -> Int[Array, " n"]:
     """All vertices along the shortest way over the mesh through these corners, in their order."""
     from scipy.sparse.csgraph import dijkstra
 
@@ -35,7 +35,7 @@ def full_path(edges: csr_matrix, corners: Sequence[int]) -> Int[Array, " n"]:
     return np.array(path)
 
 
-def distances_from(
+def geodesic_distances(
     edges: csr_matrix, sources: Int[Array, " n"]
 ) -> tuple[Float[Array, " v"], Int[Array, " v"]]:
     """(V,) way over the mesh to the nearest source, mm, infinite where there is none; (V,) it."""
@@ -45,13 +45,13 @@ def distances_from(
     return distance, nearest
 
 
-def fading(distance: Float[Array, " n"], reach: float) -> Float[Array, " n"]:
+def cosine_falloff(distance: Float[Array, " n"], reach: float) -> Float[Array, " n"]:
     """1 at distance 0, 0 from `reach` on, with no kink at either end."""
     share = np.clip(distance / reach, 0.0, 1.0)
     return 0.5 + 0.5 * np.cos(np.pi * share)
 
 
-def behind(edges: csr_matrix, margin: Int[Array, " n"], front: int) -> Int[Array, " v"]:
+def behind_margin(edges: csr_matrix, margin: Int[Array, " n"], front: int) -> Int[Array, " v"]:
     """Vertices that one cannot reach from the one in front without crossing the closed margin."""
     from scipy.sparse.csgraph import connected_components
 

@@ -10,9 +10,9 @@ import numpy as np
 from mien.arrays import Array, Float, check_array, frozen
 from mien.assets.generic import GenericHead
 from mien.rig.contacts.lids import Lids, close_lids, resolve_lids
-from mien.rig.contacts.lips import Lips, part_lips, resolve_lips
+from mien.rig.contacts.lips import Lips, resolve_lips, separate_lips
 from mien.rig.followers import Followers
-from mien.rig.gaze import LOOK_UNITS, SIDES, Look, turn_eyeballs
+from mien.rig.gaze import EYE_LOOK_UNITS, SIDES, GazeModel, turn_eyeballs
 from mien.rig.sparse_offsets import SparseOffsets
 from mien.rig.unit_transfer import transfer_units
 
@@ -42,7 +42,7 @@ class Contacts:
         touching = [item.vertices for item in (left, right, lips.upper, lips.lower)]
         return Contacts((left, right), lips, followers.of_skin(np.concatenate(touching)))
 
-    def resolved(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
+    def resolve(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
         """(V, 3) mm with every contact resolved; the same array where there is none."""
         parted = resolve_lips(self.lips, vertices)
         lifted = [(lids, resolve_lids(lids, vertices)) for lids in self.lids]
@@ -58,7 +58,7 @@ class Contacts:
 
 
 @dataclass(frozen=True)
-class Mechanics:
+class FaceDeformer:
     """How units, gaze and contacts move one head.
 
     Attributes:
@@ -69,20 +69,20 @@ class Mechanics:
         close: which units jawOpen and mouthClose are.
     """
 
-    look: Look
+    gaze_model: GazeModel
     contacts: Contacts
     offsets: SparseOffsets
     jaw: int
     close: int
 
-    taken_over: ClassVar[tuple[str, ...]] = (*LOOK_UNITS, "mouthClose")
+    nonlinear_units: ClassVar[tuple[str, ...]] = (*EYE_LOOK_UNITS, "mouthClose")
     """Units that do something else than add their offsets: eyeballs turn, and a mouth can be
     closed only as far as the jaw is open."""
 
     @staticmethod
     def of(
         generic: GenericHead, vertices: Float[Array, "v 3"], units: Float[Array, "52 v 3"]
-    ) -> Mechanics:
+    ) -> FaceDeformer:
         """For a head with these neutral vertices and unit offsets, mm.
 
         Raises:
@@ -90,12 +90,12 @@ class Mechanics:
         """
         units = check_array("units", units, generic.unit_offsets.shape)
         vertices = check_array("vertices", vertices, generic.mesh.vertices.shape)
-        look = Look.of(generic, vertices)
+        look = GazeModel.of(generic, vertices)
         offsets = SparseOffsets.of(look.without_eyeballs(units))
         jaw, close = (generic.unit_names.index(name) for name in ("jawOpen", "mouthClose"))
-        return Mechanics(look, Contacts.of(generic, vertices), offsets, jaw, close)
+        return FaceDeformer(look, Contacts.of(generic, vertices), offsets, jaw, close)
 
-    def applied(
+    def deform(
         self,
         vertices: Float[Array, "v 3"],
         units: Float[Array, " u"],
@@ -111,12 +111,12 @@ class Mechanics:
             gaze: yaw and pitch, radians; in addition to what the units say; the lids go along.
             contacts: off where lids and lips may pass through each other.
         """
-        weights, angles = self.look.motion(units, gaze)
+        weights, angles = self.gaze_model.motion(units, gaze)
         weights[self.close] -= max(units[self.close] - max(units[self.jaw], 0.0), 0.0)
         moved = vertices.copy()
         self.offsets.add(weights, moved)
-        self.look.turn(moved, angles)
-        return self.contacts.resolved(moved) if contacts else moved
+        self.gaze_model.turn(moved, angles)
+        return self.contacts.resolve(moved) if contacts else moved
 
 
 def fit_units(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[Array, "52 v 3"]:
@@ -133,5 +133,5 @@ def fit_units(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[Arra
     """
     units = transfer_units(generic, vertices)
     units = close_lids(generic, vertices, turn_eyeballs(generic, vertices, units))
-    units = part_lips(generic, vertices, units)
+    units = separate_lips(generic, vertices, units)
     return units.astype(np.float32)
