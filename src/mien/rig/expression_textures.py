@@ -1,7 +1,7 @@
-"""Textures of a person's expressions: each one's photos over neutral's, eyes and teeth in common.
+"""Textures of a person's expressions: layers over neutral's texture, with common eyes and teeth.
 
-Eyes and teeth are half hidden in most photos. What one expression shows of them serves all others
-([Pighin 2002] sec. 5.2.4), as bright as the opening of lids and lips lets them be.
+Eyes and teeth are half hidden in most photos. What one expression shows of them is used for all
+([Pighin 2002] sec. 5.2.4), shaded by the opening of lids and lips.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ _GROUPS: Mapping[str, tuple[int, str]] = {
     "lower_teeth": (2, TEETH),
     "tongue": (2, TEETH),
 }
-"""The parts in the shadow of lids and lips: which opening and which polynomial is theirs."""
+"""The parts shaded by lids and lips, with the index of their opening and their polynomial."""
 _MOUTH = 2
 _AROUND_MM = (4.0, 10.0)
-"""What belongs to an eye or a mouth: all within the first distance, nothing beyond the second."""
+"""Surroundings of an eye or mouth: weight 1 within the first distance, 0 beyond the second."""
 _MIN_CONFIDENCE = 0.9
 _TINTS = (0.4, 1.2)
 _MIN_TEXELS = 60
@@ -55,8 +55,8 @@ class ExpressionPhotos:
 
     Attributes:
         vertices: (V, 3) mm, eyes turned.
-        cameras: of those that show it.
-        photos: of those that show it.
+        cameras: of its photos.
+        photos: that show it.
     """
 
     vertices: Float[Array, "v 3"]
@@ -66,12 +66,12 @@ class ExpressionPhotos:
 
 @dataclass(frozen=True)
 class ExpressionTextures:
-    """How a person layers in each expression.
+    """The textures of all expressions.
 
     Attributes:
         textures: (H, W, 3) by expression.
         shading: of eyes and teeth.
-        gains: (K, 3) by expression, what each photo's colours were multiplied by.
+        gains: (K, 3) by expression, factors on each photo's colours.
     """
 
     textures: dict[str, UInt8[Array, "h w 3"]]
@@ -91,6 +91,7 @@ def extract_expression_textures(
         mesh: neutral.
         photos: by expression, neutral among them.
         base: (H, W, 3) neutral's texture from all of its photos, holes filled.
+        generic: its topology and regions.
     """
     height, width = base.shape[:2]
     surface = atlas_surface(mesh, width=width, height=height)
@@ -99,9 +100,9 @@ def extract_expression_textures(
     }
     texels = {part: part_mask(surface, mesh, part) for part in _GROUPS}
     openings = OpeningMeter.of(generic, mesh.vertices)
-    openings_by_name = {name: openings.measure(item.vertices) for name, item in photos.items()}
-    shading = _fit_shading(texels, layers, openings_by_name)
-    light = {name: brightness_at(at, shading) for name, at in openings_by_name.items()}
+    openings_of = {name: openings.measure(item.vertices) for name, item in photos.items()}
+    shading = _fit_shading(texels, layers, openings_of)
+    light = {name: brightness_at(at, shading) for name, at in openings_of.items()}
     common = _common_parts(surface, mesh, texels, layers, light, base, generic)
     textures = {}
     for name, layer in layers.items():
@@ -143,8 +144,8 @@ def _layer(
         return layer_of(
             range(len(item.cameras)), np.sum(list(default_masks(generic).values()), axis=0)
         )
-    # The photos of a neutral face from several sides are blended already. What lies between and
-    # around lids and lips comes from one photo for each: two would not agree
+    # The photos of a neutral face from several sides are blended already. The inside and the
+    # surroundings of each slit come from one photo: two would not agree
     # ([Pighin 2002] sec. 5.2.4).
     layers = [
         layer_of([_best_view(mesh, lines, item.cameras)], mask)
@@ -173,7 +174,7 @@ def _slits(mesh: Mesh, generic: GenericHead) -> list[tuple[Int[Array, " n"], Flo
 
 
 def _best_view(mesh: Mesh, around: Int[Array, " n"], cameras: Sequence[Camera]) -> int:
-    """The photo that shows the vertices largest and most squarely."""
+    """The photo that shows the vertices largest and most frontally."""
     points, normals = mesh.vertices[around], mesh.vertex_normals()[around]
 
     def quality(camera: Camera) -> float:
@@ -188,9 +189,9 @@ def _best_view(mesh: Mesh, around: Int[Array, " n"], cameras: Sequence[Camera]) 
 def _fit_shading(
     texels: Mapping[str, Bool[Array, "h w"]],
     layers: Mapping[str, TextureLayer],
-    openings_by_name: Mapping[str, Float[Array, " 3"]],
+    openings_of: Mapping[str, Float[Array, " 3"]],
 ) -> dict[str, Polynomial]:
-    """From how bright the expressions show the same texels."""
+    """Fitted to the brightness of the same texels in different expressions."""
     measured: dict[str, list[tuple[float, float, float]]] = {EYES: [], TEETH: []}
     for part, (column, kind) in _GROUPS.items():
         reference = _by_coverage(layers, texels[part])[-1]
@@ -198,21 +199,21 @@ def _fit_shading(
             ratio = _brightness_ratio(layer, layers[reference], texels[part])
             if name != reference and ratio is not None:
                 pair = (
-                    float(openings_by_name[name][column]),
-                    float(openings_by_name[reference][column]),
+                    float(openings_of[name][column]),
+                    float(openings_of[reference][column]),
                 )
                 measured[kind].append((*pair, ratio))
     return {kind: fit_polynomial(kind, pairs) for kind, pairs in measured.items()}
 
 
 def _tint(surface: SurfaceMap, mesh: Mesh, base: UInt8[Array, "h w 3"]) -> Float[Array, " 3"]:
-    """(3,) by how much the person's skin is darker or warmer than skin usually is in photos."""
+    """(3,) ratio of the person's skin colour to the default one."""
     skin = base[part_mask(surface, mesh, "skin")]
     return np.clip(np.median(skin, axis=0) / np.array(SKIN.default), *_TINTS)
 
 
 def _by_coverage(layers: Mapping[str, TextureLayer], texels: Bool[Array, "h w"]) -> list[str]:
-    """The expressions from the one that shows least of the texels to the one that shows most."""
+    """The expressions by how much of the texels they show, ascending."""
     return sorted(layers, key=lambda name: float(layers[name].confidence[texels].sum()))
 
 
@@ -235,10 +236,9 @@ def _common_parts(
     base: UInt8[Array, "h w 3"],
     generic: GenericHead,
 ) -> Float[Array, "h w 3"]:
-    """(H, W, 3) eyes and teeth in full light: from the expression that shows most of each, then
+    """(H, W, 3) eyes and teeth in full light, from the expression that shows most of each first.
 
-    from the next. What none shows has neutral's colours, or usual ones, which take on the light
-    that is on the skin.
+    Texels that none shows have neutral's colours, or default ones in the light of the skin.
     """
     common = base.astype(np.float32)
     tint = _tint(surface, mesh, base)

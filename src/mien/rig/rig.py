@@ -1,4 +1,4 @@
-"""A head that can be moved: photographed expressions, face units and gaze to one posed face."""
+"""The rig of a head: photographed expressions, face units and gaze to one posed face."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mien.rig.state import FACE, FaceState, PosedFace
 from mien.rig.unit_decomposition import UnitDecomposition
 
 WEIGHTED_REGIONS = (*MASK_NAMES, FACE)
-"""Those that have weights of their own in the end; the face's hold in the rest of the head."""
+"""Regions that weights are resolved to; those of the face hold in the rest of the head."""
 
 
 class Rig:
@@ -38,9 +38,8 @@ class Rig:
             textures of different sizes.
 
     Source:
-        [Pighin 2002] sec. 6.1.1: consensus geometry, weights by region. Units, contacts and what of
-        an expression comes along with the units that explain it are ours
-        (docs/method/expressions.md).
+        [Pighin 2002] sec. 6.1.1: consensus geometry, weights by region. Units, contacts and the
+        residuals of expressions that follow the units are ours (docs/method/expressions.md).
     """
 
     def __init__(self, head: Head) -> None:
@@ -55,12 +54,12 @@ class Rig:
         units = np.asarray(head.units, np.float64)
         masks = check_masks(head.regions or default_masks(generic), len(self._neutral))
         by_mask = np.stack([masks[name] for name in MASK_NAMES], axis=1)
-        self._shares = np.column_stack([by_mask, 1 - by_mask.sum(axis=1)])
+        self._masks = np.column_stack([by_mask, 1 - by_mask.sum(axis=1)])
         expressions = [head.expressions[name] for name in self.names]
         self._gaze = np.stack([item.gaze for item in expressions])
         self._deformer = FaceDeformer.of(generic, self._neutral, units)
         self.offsets = np.stack(
-            [self._still_eyes(item.vertices) - self._neutral for item in expressions]
+            [self._with_neutral_eyes(item.vertices) - self._neutral for item in expressions]
         )
         self._decomposition = UnitDecomposition.of(
             np.array([[item.units.get(n, 0.0) for n in self.unit_names] for item in expressions]),
@@ -72,12 +71,12 @@ class Rig:
         self._shading = head.shading
         self._photographed = np.stack([item.vertices for item in expressions])
         openings = np.stack([self._openings.measure(item) for item in self._photographed])
-        self._photographed_light = brightness_at(openings, self._shading)
+        self._photographed_brightness = brightness_at(openings, self._shading)
         self._shaded = _shaded_parts(generic)
-        # Where eyes look in a photograph has nothing to do with the units that it shows.
-        self._skin_shares = self._shares.copy()
+        # Gaze in a photograph is independent of the units that it shows.
+        self._skin_masks = self._masks.copy()
         for eyeball in self._deformer.gaze_model.eyeballs:
-            self._skin_shares[eyeball.vertices] = 0
+            self._skin_masks[eyeball.vertices] = 0
 
     def evaluate(self, state: FaceState, *, contacts: bool = True) -> PosedFace:
         """The face in this state.
@@ -85,7 +84,8 @@ class Rig:
         One expression at weight 1 is that expression exactly, as photographed.
 
         Args:
-            contacts: whether lids ride on the eyes and lips do not pass through each other.
+            state: expressions, units and gaze.
+            contacts: whether to resolve contacts of lids, eyes and lips.
 
         Raises:
             InputError: an unknown region, expression or unit; weights outside [-0.5, 1.5].
@@ -102,23 +102,24 @@ class Rig:
         *,
         contacts: bool = True,
     ) -> PosedFace:
-        """What evaluate makes of a state, from its numbers; they are not checked.
+        """As evaluate, from arrays that are not checked.
 
         Args:
             by_region: weights of the expressions in each of WEIGHTED_REGIONS.
             units: weights.
             gaze: yaw and pitch, radians.
+            contacts: as for evaluate.
         """
-        weights = self._shares @ by_region
+        weights = self._masks @ by_region
         moved = bool(units.any() or gaze.any())
         if not moved and _one_expression(by_region):
             return self._as_photographed(weights)
         vertices = self._mixed(weights)
-        driven = self._decomposition.expression_weights(units) * np.clip(by_region[:, :1], 0, 1)
-        if driven.any():
-            along = self._skin_shares @ np.column_stack([-driven.sum(axis=1), driven])
-            add_mixture(along[:, 1:], self._decomposition.residuals[1:], vertices)
-            weights += along
+        following = self._decomposition.expression_weights(units) * np.clip(by_region[:, :1], 0, 1)
+        if following.any():
+            added = self._skin_masks @ np.column_stack([-following.sum(axis=1), following])
+            add_mixture(added[:, 1:], self._decomposition.residuals[1:], vertices)
+            weights += added
         vertices = self._deformer.deform(vertices, units, gaze, contacts=contacts)
         return PosedFace(vertices, weights, self._brightness(vertices, weights))
 
@@ -130,14 +131,14 @@ class Rig:
         turn: Float[Array, "2 2"] | None = None,
         contacts: bool = True,
     ) -> PosedFace:
-        """The face whose every vertex mixes the photographed expressions by weights of its own.
+        """The face with weights of the photographed expressions for every vertex.
 
         One expression at weight 1 everywhere is that expression exactly, as photographed.
 
         Args:
-            weights: (V, K) that sum to 1; alike within an eyeball.
-            offsets: (V, 3) mm, how the mixed face moves on.
-            turn: radians, yaw and pitch by which the left and the right eye turn on.
+            weights: (V, K) that sum to 1; equal within an eyeball.
+            offsets: (V, 3) mm, added to the mixed face.
+            turn: radians, yaw and pitch added to the left and the right eye.
             contacts: as for evaluate.
 
         Raises:
@@ -157,17 +158,17 @@ class Rig:
         return PosedFace(vertices, weights, self._brightness(vertices, weights))
 
     def mask(self, region: str) -> Float[Array, " v"]:
-        """(V,) in [0, 1]: how far each vertex obeys this region's weights.
+        """(V,) in [0, 1]: influence of this region's weights on each vertex.
 
         Raises:
             InputError: an unknown region.
         """
         _check_known("region", region, ENCLOSING_REGIONS)
         inside = [region in (name, *ENCLOSING_REGIONS[name]) for name in MASK_NAMES]
-        return self._shares[:, [*inside, region == FACE]].sum(axis=1)
+        return self._masks[:, [*inside, region == FACE]].sum(axis=1)
 
     def hull_notes(self, state: FaceState) -> tuple[str, ...]:
-        """What a state asks for beyond the expressions that were photographed, by its regions.
+        """Notes on weights of a state that extrapolate the photographed expressions, by region.
 
         Raises:
             InputError: as evaluate.
@@ -211,8 +212,8 @@ class Rig:
             weights[self.unit_names.index(name)] = weight
         return weights
 
-    def _still_eyes(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
-        """The expression with its eyeballs as in neutral: they are turned, not mixed."""
+    def _with_neutral_eyes(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
+        """The expression with its eyeballs as in neutral: they are rotated, not mixed."""
         still = np.array(vertices, np.float64)
         for eyeball in self._deformer.gaze_model.eyeballs:
             still[eyeball.vertices] = self._neutral[eyeball.vertices]
@@ -226,31 +227,31 @@ class Rig:
     def _mixed(self, weights: Float[Array, "v k"]) -> Float[Array, "v 3"]:
         vertices = self._neutral.copy()
         add_mixture(weights[:, 1:], self.offsets[1:], vertices)
-        self._look_as_photographed(vertices, weights)
+        self._turn_eyes_as_photographed(vertices, weights)
         return vertices
 
-    def _look_as_photographed(
+    def _turn_eyes_as_photographed(
         self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
     ) -> None:
-        """Turns the eyes in place by the mean of where they look in the photographs."""
-        look = self._deformer.gaze_model
-        balls = [eyeball.vertices[0] for eyeball in look.eyeballs]
-        look.turn(vertices, np.einsum("sk,ksa->sa", weights[balls], self._gaze))
+        """Rotates the eyes in place by the weighted mean of the gaze in the photographs."""
+        gaze_model = self._deformer.gaze_model
+        balls = [eyeball.vertices[0] for eyeball in gaze_model.eyeballs]
+        gaze_model.turn(vertices, np.einsum("sk,ksa->sa", weights[balls], self._gaze))
 
     def _brightness(
         self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
     ) -> Float[Array, " v"]:
-        """[Pighin 2002] sec. 5.2.4, over the shadow that is in the mixed textures already."""
+        """(V,) shadow ([Pighin 2002] sec. 5.2.4), relative to that in the mixed textures."""
         now = brightness_at(self._openings.measure(vertices), self._shading)
         brightness = np.ones(len(vertices))
         for column, part in enumerate(self._shaded):
-            there = weights[part[0]] @ self._photographed_light[:, column]
+            there = weights[part[0]] @ self._photographed_brightness[:, column]
             brightness[part] = now[column] / max(float(there), 0.1)
         return brightness
 
 
 def region_rows(regions: Sequence[str]) -> Int[Array, " r"]:
-    """(R,) which of these regions each of WEIGHTED_REGIONS obeys, counted from 1; 0 for none.
+    """(R,) for each of WEIGHTED_REGIONS the nearest of these, counted from 1; 0 for none.
 
     Raises:
         InputError: an unknown region.

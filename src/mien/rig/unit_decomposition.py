@@ -1,4 +1,7 @@
-"""Photographed expressions as face units plus what is left: wrinkles come along with the units."""
+"""Photographed expressions decomposed into face units and a residual, such as wrinkles.
+
+When units are animated, the residuals of the expressions whose units are nearest are added too.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +16,11 @@ from mien.rig.regions import ENCLOSING_REGIONS
 from mien.rig.state import FACE, FaceState
 
 MIN_SHARE = 0.05
-"""Of a unit's whole movement: a region where it moves less has nothing to do with it."""
+"""Least share of a unit's movement in a region for the unit to belong to it."""
 _RIDGE = 0.05
-"""Ridge on how far expressions come along: of two that would do, both a little."""
+"""Ridge on the expression weights: where two expressions fit equally, both get some weight."""
 _SUM_WEIGHT = 100.0
-"""Weight of the condition that shares sum to 1."""
+"""Weight of the condition that expression weights sum to 1."""
 _REGION_BY_PREFIX = {
     "brow": "forehead",
     "cheekPuff": "mouth",
@@ -27,20 +30,21 @@ _REGION_BY_PREFIX = {
     "mouth": "mouth",
     "tongue": "mouth",
 }
-"""By how a unit's name begins; the others belong to the face."""
+"""Region by the beginning of a unit's name; other units belong to the face."""
 _WITHOUT_SIDE = {"jawLeft", "jawRight", "mouthLeft", "mouthRight"}
-"""Their names end in a direction, not in a half of the face."""
+"""Units whose names end in a direction, not in a side of the face."""
 
 
 @dataclass(frozen=True)
 class RegionDecomposition:
-    """The units of one region's expressions, made ready for being told apart.
+    """Least squares from unit weights to expression weights in one region, factorized.
 
     Attributes:
-        expressions: (n,) those that have units here, counted without neutral.
-        units: (U,) bool, those that any of them has.
-        R: (n + 1, n + 1) upper triangular, and Q: (n + 1, U + 1) with orthonormal rows, without
-            zeros' columns: least squares for n shares and what is missing to 1 of them.
+        expressions: (n,) indices of those that have units here, neutral not counted.
+        units: (U,) bool, those that any of these expressions has.
+        R: (n + 1, n + 1) upper triangular; the unknowns are n weights and the slack that brings
+            their sum to 1.
+        Q: (n + 1, U + 1) transposed, only the columns whose right-hand side is not 0.
     """
 
     expressions: Int[Array, " n"]
@@ -53,32 +57,32 @@ class RegionDecomposition:
         """From the weights of the units in each expression but neutral."""
         used = np.flatnonzero((known**2).sum(axis=1) > 1e-6)
         count = len(used)
-        # One more unknown takes what is missing to 1, so that together they are at most 1.
+        # A slack unknown makes the condition an inequality: the weights sum to at most 1.
         sum_to_one = np.full(count + 1, _SUM_WEIGHT)
         rows = np.column_stack([known[used].T, np.zeros(known.shape[1])])
         ridge = np.column_stack([_RIDGE * np.eye(count), np.zeros(count)])
         Q, R = np.linalg.qr(np.vstack([rows, sum_to_one, ridge]))
-        answers = known.shape[1] + 1
-        return cls(used, (known != 0).any(axis=0), frozen(R), frozen(Q[:answers].T.copy()))
+        observations = known.shape[1] + 1
+        return cls(used, (known != 0).any(axis=0), frozen(R), frozen(Q[:observations].T.copy()))
 
-    def shares(self, units: Float[Array, " u"]) -> Float[Array, " n"]:
-        """(n,) from 0 up and at most 1 together, whose units are nearest to these."""
+    def weights(self, units: Float[Array, " u"]) -> Float[Array, " n"]:
+        """(n,) non-negative weights, sum at most 1, of the mixture with the nearest units."""
         from scipy.optimize import nnls
 
-        wanted = units * self.units
-        if not wanted.any() or not len(self.expressions):
+        observed = units * self.units
+        if not observed.any() or not len(self.expressions):
             return np.zeros(len(self.expressions))
-        return nnls(self.R, self.Q @ np.append(wanted, _SUM_WEIGHT))[0][:-1]
+        return nnls(self.R, self.Q @ np.append(observed, _SUM_WEIGHT))[0][:-1]
 
 
 @dataclass(frozen=True)
 class UnitDecomposition:
-    """K photographed expressions explained by U units.
+    """K photographed expressions as U units and residuals.
 
     Attributes:
-        by_region: (R, K, U) weights of the units in each expression, as far as they concern each
-            region; neutral's (row 0) are 0.
-        residuals: (K, V, 3) mm, what of each expression its units do not explain.
+        by_region: (R, K, U) weights of the units in each expression, 0 for units that do not belong
+            to the region; those of neutral (row 0) are 0.
+        residuals: (K, V, 3) mm, offsets of each expression that its units do not explain.
     """
 
     by_region: Float[Array, "r k u"]
@@ -95,27 +99,30 @@ class UnitDecomposition:
         """From unit weights and offsets of the expressions, neutral first.
 
         Args:
+            weights: (K, U) of the units in each expression.
+            units: (U, V, 3) mm.
+            offsets: (K, V, 3) mm.
             masks: (V, M); the regions are these and the rest of the head.
         """
         moved = np.linalg.norm(units, axis=2)
         total = np.maximum(moved.sum(axis=1), 1e-9)
         shares = (moved @ masks).T / total
-        concerns = np.vstack([shares >= MIN_SHARE, np.ones(len(units), bool)])
+        belongs = np.vstack([shares >= MIN_SHARE, np.ones(len(units), bool)])
         residuals = offsets - np.tensordot(weights, units, axes=1)
         residuals[0] = 0
-        return cls(concerns[:, None, :] * weights[None], residuals)
+        return cls(belongs[:, None, :] * weights[None], residuals)
 
     def expression_weights(self, units: Float[Array, " u"]) -> Float[Array, "r k-1"]:
-        """(R, K - 1) how far each expression but neutral comes along with these units.
+        """(R, K - 1) weights of the expressions but neutral that fit these unit weights best.
 
-        In each region the mixture of expressions, weights from 0 up and at most 1 together, whose
-        units are nearest to these.
+        In each region the mixture with the nearest units; weights are non-negative and sum to at
+        most 1.
         """
-        driven = np.zeros((len(self.by_region), len(self.residuals) - 1))
+        weights = np.zeros((len(self.by_region), len(self.residuals) - 1))
         if units.any():
             for region, known in enumerate(self._regions):
-                driven[region, known.expressions] = known.shares(units)
-        return driven
+                weights[region, known.expressions] = known.weights(units)
+        return weights
 
     @cached_property
     def _regions(self) -> list[RegionDecomposition]:
@@ -123,10 +130,10 @@ class UnitDecomposition:
 
 
 def units_from_state(head: Head, state: FaceState) -> dict[str, float]:
-    """Weights of the units that stand for a face: its own, and those that explain its expressions.
+    """Weights of units that approximate a face: its own, and those of its expressions.
 
-    Of an expression that holds in one region, the units of that region. What units do not explain,
-    wrinkles above all, is lost.
+    An expression that holds in one region adds the units of that region. Residuals, above all
+    wrinkles, are lost.
     """
     total = dict(state.units)
     for unit in head.unit_names:
@@ -144,7 +151,7 @@ def units_from_state(head: Head, state: FaceState) -> dict[str, float]:
 
 
 def unit_region(unit: str) -> str:
-    """The region that a unit moves: `mouthSmileLeft` is the left mouth's, `jawOpen` the mouth's."""
+    """The region that a unit moves: left_mouth for `mouthSmileLeft`, mouth for `jawOpen`."""
     region = next(
         (name for start, name in _REGION_BY_PREFIX.items() if unit.startswith(start)), FACE
     )

@@ -1,7 +1,7 @@
-"""Eyelids: they ride on the eyeballs, and upper and lower one meet without passing each other.
+"""Eyelids: contacts with the eyeball and of the upper with the lower lid.
 
-A lid's place is told on the unit sphere that the eyeball is an image of: longitude from the inner
-to the outer eye corner, latitude across, and the radius.
+Computed in spherical coordinates on the unit sphere that the eyeball is an affine image of:
+longitude from the inner to the outer eye corner, latitude across, and the radius.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ from mien.rig.skin_paths import (
 )
 
 _CLEARANCE_MM = 0.4
-"""How far off the eyeball a lid stays that is further off at rest."""
+"""Least distance from the eyeball of a lid that is further off at rest."""
 _OVERLAP_MM = 0.35
-"""How far a closed upper lid reaches over the lower one's edge: no crack between two polygons."""
+"""How far a closed upper lid overlaps the lower one's edge, so that no crack shows."""
 _IN_FRONT_MM = 0.15
-"""How far its edge then lies before the lower one's."""
+"""How far its edge then lies in front of the lower one's."""
 _REACH_MM = 14.0
-"""How far over the closed lid a correction of its edge fades out."""
+"""Distance over the closed lid at which a correction of its edge has faded out."""
 _BALL_MM = 18.0
-"""Skin further off the eyeball has nothing to do with it."""
+"""Skin further off the eyeball is not part of the lids."""
 _FULL_CONTACT_MM = 0.5
-"""Lids that would overlap by this much more lie on each other."""
+"""Excess overlap from which on the lids lie on each other."""
 _STEPS = (0.25, 0.5, 0.75, 1.0)
 
 
@@ -54,10 +54,10 @@ class Lids:
         upper: how many vertices the upper and the lower edge have, from the inner to the outer
             corner, both of which are in both.
         lower: as `upper`.
-        falloff: (L,) how far a correction of the nearer edge goes along.
-        on_upper: (L,) whether that is the upper one.
-        min_radius: (L,) radius below which a vertex is in the eyeball; its own at rest if that is less;
-            0 on the back of the lids, which may be.
+        falloff: (L,) weight of a correction of the nearer edge.
+        on_upper: (L,) whether the nearer edge is the upper one.
+        min_radius: (L,) a smaller radius is in the eyeball; the radius at rest if that is
+            less; 0 on the back of the lids, which is not tested.
         axes: (3, 3) rows: towards the middle of the lids, towards the outer corner, upwards.
     """
 
@@ -116,11 +116,11 @@ class Lids:
         return frozen(self.axes @ self.eyeball.shape.T)
 
     def spherical(self, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
-        """(L, 3) longitude and latitude, radians, and radius of the lids on the unit sphere."""
+        """(L, 3) longitude and latitude, radians, and radius of the lids."""
         return to_spherical((vertices[self.vertices] - self.eyeball.centre) @ self.to_sphere)
 
     def from_spherical(self, coordinates: Float[Array, "l 3"]) -> Float[Array, "l 3"]:
-        """(L, 3) mm: the inverse of coordinates."""
+        """(L, 3) mm: the inverse of spherical."""
         longitude, latitude, radius = coordinates.T
         points = np.column_stack(
             [
@@ -141,19 +141,19 @@ class Lids:
 
     @cached_property
     def full_overlap(self) -> Float[Array, " u"]:
-        """(U,) radians: that of closed lids; none at the corners, where both are one."""
+        """(U,) radians: overlap of closed lids; 0 at the corners, which both share."""
         shape = np.sin(np.linspace(0, np.pi, self.upper)) ** 0.5
         return frozen(_OVERLAP_MM / self.eyeball.radius * shape)
 
     @cached_property
     def in_front(self) -> Float[Array, " u"]:
-        """(U,) by how much more radius closed upper lids lie before the lower ones."""
+        """(U,) difference of radius by which closed upper lids lie in front of the lower ones."""
         return frozen(self.full_overlap * (_IN_FRONT_MM / _OVERLAP_MM))
 
     def spread(
         self, coordinates: Float[Array, "l 3"], corrections: Float[Array, " u"]
     ) -> Float[Array, " l"]:
-        """(L,) what corrections along the upper edge are elsewhere on both lids."""
+        """(L,) corrections along the upper edge, extended over both lids."""
         along: Array = interpolate_along_edge(coordinates[:, 0], self.upper, corrections)
         return along * self.falloff
 
@@ -164,6 +164,7 @@ def close_lids(
     """The units with lids that close at eyeBlink 1 and never enter the eyeball.
 
     Args:
+        generic: its topology and unit names.
         vertices: (V, 3) mm, the neutral face.
         units: (52, V, 3) mm, as transferred.
     """
@@ -184,7 +185,7 @@ def close_lids(
 
 
 def _closing(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
-    """(L, 3) mm that lays the upper edge along the lower one, just over and before it."""
+    """(L, 3) mm that moves the upper edge onto the lower one, just over and in front of it."""
     before = lids.spherical(vertices)
     coordinates = before.copy()
     coordinates[:, 2] = np.maximum(coordinates[:, 2], lids.min_radius)
@@ -215,7 +216,7 @@ def _axes(corners: Float[Array, "2 3"]) -> Float[Array, "3 3"]:
 def resolve_lids(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"] | None:
     """(L, 3) mm that takes the lids out of each other and out of the eyeball; None: no contact.
 
-    The eyeball may have been carried elsewhere; it is taken to be where its vertices are.
+    The position of the eyeball is taken from its vertices.
     """
     ball = vertices[lids.eyeball.vertices]
     points = (vertices[lids.vertices] - ball.sum(axis=0) / len(ball)) @ lids.to_sphere

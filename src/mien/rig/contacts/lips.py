@@ -1,4 +1,4 @@
-"""Lips: they meet, and do not pass through each other."""
+"""Lips: closing of a closed mouth, and contacts of the two lips."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from mien.numeric.signed_distance import penetration_depths
 from mien.rig.skin_paths import cosine_falloff, geodesic_distances, shortest_path, skin_edges
 
 _PATCH_MM = 14.0
-"""Skin so near to the line where the lips meet is lip, front and back."""
+"""Skin this near to the line where the lips meet is lip, front and back."""
 _TESTED_MM = 8.0
 _SPREAD_MM = 6.0
-"""How far a correction of one vertex goes along."""
+"""Distance at which the correction of a vertex has faded out."""
 _DEEPEST_MM = 6.0
 _TOLERANCE_MM = 0.05
 _STEP = 0.6
-"""Share of its depth by which a vertex gives way in a round; the other lip does so too."""
-_STEEPEST = 0.5
-"""The way up counts as no longer than twice the nearest way out."""
+"""Share of its depth by which a vertex moves in an iteration; the other lip does too."""
+_MIN_RISE = 0.5
+"""The vertical way out is at most twice as long as the nearest one."""
 _ROUNDS = 4
 CLOSED_MM = 2.0
-"""A mouth whose lips are less far apart in the middle is closed."""
+"""Largest gap in the middle of a closed mouth."""
 _OPEN_MM = 4.0
-"""Where a closed mouth's lips are so far apart they are left alone."""
+"""Gap from which on the lips of a closed mouth are not moved."""
 _CLOSING_SPREAD_MM = 7.0
 
 
@@ -38,11 +38,11 @@ class Lip:
     Attributes:
         vertices: (P,) of the mesh.
         triangles: (F, 3) into them.
-        border: (P,) where it ends.
-        tested: (T,) those that can get into the other lip.
-        spread: (P, T) how far a correction of a tested vertex goes along; 1 at itself.
-        allowed: (T,) mm, how deep each is in the other lip when the face is neutral.
-        upwards: 1 for the upper lip, -1 for the lower: where it gives way to.
+        border: (P,) whether a vertex is on its boundary.
+        tested: (T,) vertices that can penetrate the other lip.
+        spread: (P, T) weights of the correction of a tested vertex; 1 at itself.
+        allowed: (T,) mm, penetration of the neutral face.
+        upwards: direction of corrections: 1 for the upper lip, -1 for the lower.
     """
 
     vertices: Int[Array, " p"]
@@ -63,7 +63,7 @@ class Lips:
 
     @staticmethod
     def of(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Lips:
-        """For a head with these neutral vertices, (V, 3) mm: what touches now may go on so."""
+        """For a head with these neutral vertices, (V, 3) mm, whose penetration is allowed."""
         edges = skin_edges(generic, generic.mesh.vertices)
         upper, lower = (
             shortest_path(edges, generic.polylines[f"{which}_lip_inner"])
@@ -78,26 +78,26 @@ class Lips:
         return Lips(_allowing(first, first_depth), _allowing(second, second_depth))
 
     def depths(self, vertices: Float[Array, "v 3"]) -> Float[Array, " t"]:
-        """mm by which the tested vertices of both lips are in the other one; 0 outside."""
+        """(T,) mm by which the tested vertices penetrate the other lip; 0 outside."""
         return np.concatenate(_depths(self.upper, self.lower, vertices))
 
     @property
     def allowed(self) -> Float[Array, " t"]:
-        """mm, the depths of the neutral face."""
+        """(T,) mm, penetration of the neutral face."""
         return np.concatenate([self.upper.allowed, self.lower.allowed])
 
 
 def resolve_lips(
     lips: Lips, vertices: Float[Array, "v 3"], *, rounds: int = _ROUNDS
 ) -> Float[Array, "v 3"] | None:
-    """(V, 3) mm that takes the lips out of each other; None where they are not in each other.
+    """(V, 3) mm that takes the lips out of each other; None without contact.
 
-    In every round vertices of the upper lip that are in the lower one give way upwards, those of
-    the lower lip downwards, and the skin around goes along. (The nearest way out may lead through
-    the front of the other lip.)
+    In every iteration penetrating vertices of the upper lip move up and those of the lower lip
+    down, and the skin around follows. (The nearest way out may lead through the front of the other
+    lip.)
     """
     upper, lower = lips.upper, lips.lower
-    places = above, below = vertices[upper.vertices], vertices[lower.vertices]
+    above, below = before = vertices[upper.vertices], vertices[lower.vertices]
     up, down = _corrections(upper, above, lower, below), _corrections(lower, below, upper, above)
     if not (up.any() or down.any()):
         return None
@@ -113,19 +113,20 @@ def resolve_lips(
         if not (up.any() or down.any()):
             break
     moved = np.zeros_like(vertices)
-    moved[upper.vertices] = above - places[0]
-    moved[lower.vertices] = below - places[1]
+    moved[upper.vertices] = above - before[0]
+    moved[lower.vertices] = below - before[1]
     return moved
 
 
 def separate_lips(
     generic: GenericHead, vertices: Float[Array, "v 3"], units: Float[Array, "52 v 3"]
 ) -> Float[Array, "52 v 3"]:
-    """The units with lips that are not in each other at weight 1.
+    """The units with lips that do not penetrate each other at weight 1.
 
     mouthClose is made for an open jaw and is corrected together with jawOpen.
 
     Args:
+        generic: its topology and unit names.
         vertices: (V, 3) mm, the neutral face.
         units: (52, V, 3) mm.
     """
@@ -141,7 +142,7 @@ def separate_lips(
 
 
 def _separated(lips: Lips, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
-    """(V, 3) mm with lips that are not in each other, however long that takes."""
+    """(V, 3) mm with lips that do not penetrate each other."""
     for _ in range(_ROUNDS):
         moved = resolve_lips(lips, vertices, rounds=4 * _ROUNDS)
         if moved is None:
@@ -195,23 +196,23 @@ def _depths(upper: Lip, lower: Lip, vertices: Float[Array, "v 3"]) -> tuple[Arra
 
 
 def _penetration(
-    points: Float[Array, "n 3"], lip: Lip, places: Float[Array, "p 3"]
+    points: Float[Array, "n 3"], lip: Lip, vertices: Float[Array, "p 3"]
 ) -> tuple[Array, Array, Array]:
-    """Depth of points in a lip whose vertices are at these places, and the nearest places on it."""
-    return penetration_depths(points, places, lip.triangles, lip.border, _DEEPEST_MM)
+    """Penetration of points in a lip with these vertices, and the nearest points on it."""
+    return penetration_depths(points, vertices, lip.triangles, lip.border, _DEEPEST_MM)
 
 
 def _corrections(
     lip: Lip,
-    places: Float[Array, "p 3"],
+    vertices: Float[Array, "p 3"],
     other: Lip,
     others: Float[Array, "q 3"],
     among: Int[Array, " n"] | None = None,
 ) -> Float[Array, "t 3"]:
-    """(T, 3) mm by which the tested vertices (only those `among` them) give way."""
+    """(T, 3) mm by which the tested vertices (only those `among` them) move out."""
     corrections = np.zeros((len(lip.tested), 3))
     among = np.arange(len(lip.tested)) if among is None else among
-    points = places[lip.tested[among]]
+    points = vertices[lip.tested[among]]
     depth, triangle, weights = _penetration(points, other, others)
     deep = np.flatnonzero(depth - lip.allowed[among] > _TOLERANCE_MM)
     if not len(deep):
@@ -220,18 +221,18 @@ def _corrections(
     nearest = (weights[deep][..., None] * corners).sum(axis=1)
     rise = lip.upwards * (nearest - points[deep])[:, 1] / depth[deep]
     excess = depth[deep] - lip.allowed[among[deep]]
-    corrections[among[deep], 1] = lip.upwards * _STEP * excess / np.maximum(rise, _STEEPEST)
+    corrections[among[deep], 1] = lip.upwards * _STEP * excess / np.maximum(rise, _MIN_RISE)
     return corrections
 
 
 def _neighbours(lip: Lip, corrections: Float[Array, "t 3"]) -> Int[Array, " n"]:
-    """The tested vertices that go along with those that give way."""
+    """The tested vertices that the corrections reach."""
     hit = corrections.any(axis=1)
     return np.flatnonzero(lip.spread[np.ix_(lip.tested, hit)].any(axis=1))
 
 
 def _spread_corrections(lip: Lip, corrections: Float[Array, "t 3"]) -> Float[Array, "p 3"]:
-    """(P, 3) the weighted mean of the corrections around, fading where there are none."""
+    """(P, 3) the weighted mean of the corrections around, fading with distance."""
     chosen = np.flatnonzero(corrections.any(axis=1))
     if not len(chosen):
         return np.zeros((len(lip.vertices), 3))
@@ -242,12 +243,13 @@ def _spread_corrections(lip: Lip, corrections: Float[Array, "t 3"]) -> Float[Arr
 
 
 def close_lips(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
-    """The head with lips that meet, half of the gap from either side; an open mouth stays open.
+    """The head with lips that meet halfway; an open mouth stays open.
 
-    The generic head's lips are apart by a hair at the corners, and what a photo shows of closed
-    lips is one line. They move up and down alone: one lip may lie before the other.
+    The generic head's lips are slightly apart at the corners, while photos show closed lips as one
+    line. Only heights change: one lip may lie in front of the other.
 
     Args:
+        generic: its topology.
         vertices: (V, 3) mm.
     """
     edges = skin_edges(generic, generic.mesh.vertices)
@@ -262,14 +264,14 @@ def close_lips(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[Arr
     sources = np.concatenate([lines[0], lines[1][1:-1]])
     moves = np.concatenate([_halfway(upper, lower), _halfway(lower, upper)[1:-1]])
     distance, nearest = geodesic_distances(edges, sources)
-    carried = np.zeros_like(vertices)
+    offsets = np.zeros_like(vertices)
     index: Int[Array, " v"] = np.full(len(vertices), -1)
     index[sources] = np.arange(len(sources))
     near = np.flatnonzero(distance < _CLOSING_SPREAD_MM)
-    carried[near] = (
+    offsets[near] = (
         cosine_falloff(distance[near], _CLOSING_SPREAD_MM)[:, None] * moves[index[nearest[near]]]
     )
-    return vertices + carried
+    return vertices + offsets
 
 
 def _halfway(line: Float[Array, "n 3"], other: Float[Array, "m 3"]) -> Float[Array, "n 3"]:
@@ -280,7 +282,7 @@ def _halfway(line: Float[Array, "n 3"], other: Float[Array, "m 3"]) -> Float[Arr
 
 
 def _arc_fractions(line: Float[Array, "n 3"]) -> Float[Array, " n"]:
-    """From 0 to 1 by the length along a line."""
+    """Normalized arc length of the vertices of a line, 0 to 1."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(steps)])
     return length / max(float(length[-1]), 1e-9)
