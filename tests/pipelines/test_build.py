@@ -53,8 +53,8 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
         }
         return extract_expression_textures(mesh, photographed, *others)
 
-    monkeypatch.setattr("mien.pipelines.build.extract_texture", grey)
-    monkeypatch.setattr("mien.pipelines.build.extract_expression_textures", paint)
+    monkeypatch.setattr("mien.pipelines.head_textures.extract_texture", grey)
+    monkeypatch.setattr("mien.pipelines.head_textures.extract_expression_textures", paint)
     return seen
 
 
@@ -76,8 +76,8 @@ def test_a_head_of_one_expression(calls: SimpleNamespace) -> None:
         photo = fit.photos[item.photo]
         assert item.camera is photo.camera
         assert item.rms_px == photo.rms_px
-        assert item.points_used == len(photo.trusted)
-        assert item.distrusted == {m.name: m.verdict for m in photo.marks if m.verdict}
+        assert item.points_used == len(photo.inliers)
+        assert item.distrusted == {m.name: m.rejection for m in photo.marks if m.rejection}
     assert result.notes == ("a.png: blurred", NOTHING_SHARED)
 
 
