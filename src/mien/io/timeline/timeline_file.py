@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from mien.animate.channels import MEMBERS, REGIONS, UNITS, split
+from mien.animate.channels import MEMBERS, REGION_NAMES, UNITS, split
 from mien.animate.timeline import Timeline, Tracks
 from mien.errors import FileFormatError, InputError
 from mien.reading.strict_json import unknown_name
@@ -43,7 +43,7 @@ def check_timeline(
     *,
     expressions: Collection[str],
     units: Collection[str],
-    regions: Collection[str] = REGIONS,
+    regions: Collection[str] = REGION_NAMES,
     path: str | Path = "timeline",
 ) -> None:
     """Refuse a timeline that moves what a head does not have.
