@@ -22,7 +22,7 @@ from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.source import CapturedView
-from mien.reconstruction.fit import Fit
+from mien.reconstruction.result import NeutralFit
 
 __all__ = ["Outcome", "cameras_by_stem", "outcome_of", "without_marks"]
 
@@ -48,7 +48,7 @@ class Outcome:
     focal: list[float]
 
 
-def outcome_of(fit: Fit, scan: Scan, generic: GenericHead) -> Outcome:
+def outcome_of(fit: NeutralFit, scan: Scan, generic: GenericHead) -> Outcome:
     """Lays a fitted head, and the generic head for comparison, on the scan."""
     cameras = cameras_by_stem(fit)
     mesh = generic.mesh.with_vertices(fit.vertices)
@@ -76,7 +76,7 @@ def outcome_of(fit: Fit, scan: Scan, generic: GenericHead) -> Outcome:
     )
 
 
-def cameras_by_stem(fit: Fit) -> dict[str, Camera]:
+def cameras_by_stem(fit: NeutralFit) -> dict[str, Camera]:
     """The fitted cameras by the names that scans give their photos."""
     return {Path(name).stem: photo.camera for name, photo in fit.photos.items()}
 

@@ -31,7 +31,7 @@ from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.capture.source import CapturedView, load_capture
 from mien.errors import EstimationError
-from mien.reconstruction.fit import Fit, FitOptions, fit_views
+from mien.reconstruction.fit import FitOptions, NeutralFit, fit_views
 
 WINDOW = 4
 QUICK = ("James, 2 photos", "james-5", "person-1")
@@ -123,7 +123,7 @@ def measure(case: Case, generic: GenericHead) -> Result:
 
 
 def _same_point(
-    fit: Fit,
+    fit: NeutralFit,
     outcome: Outcome,
     scan: Scan,
     generic: GenericHead,

@@ -86,7 +86,7 @@ def measure(
         every: so many frames from one to the next that is drawn, which takes longest.
     """
     video = Video(path)
-    facts = video.facts()
+    facts = video.info()
     read = [(frame.seconds, frame.pixels()) for frame in video.frames()]
     frames = tuple(pixels for _, pixels in read)
     focal = float(np.median([view.camera.focal_px for view in head.views]))

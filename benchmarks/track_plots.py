@@ -47,7 +47,7 @@ def real(detector: LandmarkDetector, path: Path, head: Head, *, first: int, coun
     """[Pighin 2002]'s fig. 17: frames of a clip that may be shown, and what was found in them."""
     frames = [frame.pixels() for frame in Video(path).frames() if first <= frame.index][:count]
     focal = float(np.median([view.camera.focal_px for view in head.views]))
-    fps = Video(path).facts().fps
+    fps = Video(path).info().fps
     found = follow(head, frames, detector, focal_px=focal, fps=fps)
     _sheet("tracking-clip", frames, found.track, head)
 

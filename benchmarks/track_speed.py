@@ -149,7 +149,7 @@ def compare(work: Path, clip: Path, head: Path, *, runs: int) -> str:
     """Both programs at both sizes, in turn; medians."""
     rows = []
     for name, size in SIZES.items():
-        count, fps = FRAMES[name], Video(clip).facts().fps
+        count, fps = FRAMES[name], Video(clip).info().fps
         whole, one = work / f"{name}.mp4", work / f"{name}-one.mp4"
         save_video(whole, ping_pong(clip, size, count), fps)
         save_video(one, ping_pong(clip, size, 1), fps)
@@ -192,7 +192,7 @@ def _each(seconds: dict[str, float], count: int) -> list[float]:
 def memory_over(work: Path, clip: Path, head: Path, count: int) -> str:
     """What a long video takes."""
     video = work / "long.mp4"
-    save_video(video, ping_pong(clip, SIZES["300x300"], count), Video(clip).facts().fps)
+    save_video(video, ping_pong(clip, SIZES["300x300"], count), Video(clip).info().fps)
     ran = run(track_command(video, head, work / "track.csv"))
     row = [f"300x300, {count} frames", ran.seconds, count / ran.seconds, ran.peak_mb, ran.growth_mb]
     header = ("mien", "s", "frames/s", "peak MiB", "MiB from the second tenth to the last")

@@ -23,7 +23,7 @@ def clip(
     *,
     sharpness: list[float] | None = None,
     scores: list[Array] | None = None,
-    lips_apart: list[float] | None = None,
+    lip_gap: list[float] | None = None,
 ) -> FrameScores:
     """Frames 0, 10, 20, ... with yaw in degrees; at rest, closed and sharp unless said."""
     count = len(yaw)
@@ -32,5 +32,5 @@ def clip(
         sharpness=np.array(sharpness or [1.0] * count),
         pose=np.column_stack([np.radians(yaw), np.zeros(count)]),
         blendshapes=np.stack(scores or [np.zeros(52)] * count),
-        lips_apart=np.array(lips_apart or [0.0] * count),
+        lip_gap=np.array(lip_gap or [0.0] * count),
     )

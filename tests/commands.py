@@ -94,7 +94,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Builds whose turntable and cylinder, the slowest stages, are small."""
     monkeypatch.setattr("mien.pipelines.build.turntable_frames", SHORT_TURNTABLE)
     monkeypatch.setattr(
-        "mien.pipelines.build.cylinder_surface", partial(cylinder_surface, width=128, height=64)
+        "mien.pipelines.head_textures.cylinder_surface",
+        partial(cylinder_surface, width=128, height=64),
     )
 
 
@@ -108,7 +109,7 @@ def untextured(monkeypatch: pytest.MonkeyPatch, quick: None) -> None:
         shape, gains = surface.triangle_ids.shape, np.ones((len(cameras), 3))
         return Texture(np.full((*shape, 3), 128, np.uint8), np.ones(shape), gains)
 
-    monkeypatch.setattr("mien.pipelines.build.extract_texture", grey)
+    monkeypatch.setattr("mien.pipelines.head_textures.extract_texture", grey)
     monkeypatch.setattr("mien.pipelines.build.render_report", lambda data, **options: "")
 
 

@@ -28,10 +28,10 @@ class Blind(LandmarkDetector):
     def __init__(self) -> None:
         pass
 
-    def all_fast(self, pixels: Array) -> list[DetectedFace]:
+    def detect_all_fast(self, pixels: Array) -> list[DetectedFace]:
         return []
 
-    def all_in_parts(self, pixels: Array) -> list[DetectedFace]:
+    def detect_in_tiles(self, pixels: Array) -> list[DetectedFace]:
         return []
 
 
@@ -42,7 +42,7 @@ class Shown(Blind):
         self.faces = list(faces)
         self.sizes: list[tuple[int, ...]] = []
 
-    def all_fast(self, pixels: Array) -> list[DetectedFace]:
+    def detect_all_fast(self, pixels: Array) -> list[DetectedFace]:
         self.sizes.append(pixels.shape[1::-1])
         face = self.faces.pop(0)
         return [] if face is None else [face]

@@ -22,14 +22,10 @@ if TYPE_CHECKING:
     from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "mien"
 NAMESPACES = (
     "mien",
-    "mien.track",
-    "mien.synthesis",
-    "mien.texture",
-    "mien.io",
-    "mien.rig",
-    "mien.render",
+    *sorted(f"mien.{stub.parent.name}" for stub in PACKAGE.glob("*/__init__.pyi")),
 )
 _RESULTS = "benchmarks/results"
 _CITATION = re.compile(r"\[(Pighin|Zhang) (2002|2006)\]")

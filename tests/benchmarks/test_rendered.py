@@ -32,7 +32,7 @@ from benchmarks.subjects import (
 
 from mien.arrays import Array
 from mien.assets.generic import load_generic_head
-from mien.capture.images.photos import load_photo, shrunk
+from mien.capture.images.photos import downscale, load_photo
 from mien.mesh import Mesh
 from mien.numeric.images.sampling import sample_bilinear
 from mien.render.shade import rasterize_mesh
@@ -242,7 +242,7 @@ def test_a_true_camera_sees_what_was_photographed(shared: Path) -> None:
         folder = shared / "data" / person
         camera = load_scan(folder).cameras[Path(photos).stem]
         photo = load_photo(folder / photos).pixels
-        small = shrunk(photo, max(photo.shape) // 4)
+        small = downscale(photo, max(photo.shape) // 4)
         camera = camera.resized(small.shape[0] / photo.shape[0])
         head = subject(folder)
         image = render_exactly(head, camera, finer=2)

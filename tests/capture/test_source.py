@@ -13,7 +13,7 @@ from mien.capture import source
 from mien.capture.annotations import AnnotationNames
 from mien.capture.faces.detector import NO_FACE_FOUND
 from mien.capture.images.photos import Photo
-from mien.capture.source import TO_BE_PLACED, load_capture
+from mien.capture.source import NO_FACE_YET, load_capture
 from mien.capture.video.picked_frames import PickedFrames
 from mien.errors import EstimationError, FileFormatError, InputError
 
@@ -105,7 +105,7 @@ def test_photo_without_a_face_stays_beside_others(
     capture = load_capture(tmp_path)
     assert [view.photo.name for view in capture.views] == ["a.png", "b.png"]
     assert [view.marked for view in capture.views] == [False, True]
-    assert capture.notes == (f"a.png: {TO_BE_PLACED}",)
+    assert capture.notes == (f"a.png: {NO_FACE_YET}",)
 
 
 def test_photo_without_a_face_stays_beside_annotations(tmp_path: Path, wall: Array) -> None:

@@ -12,8 +12,7 @@ from PIL import Image
 
 from filmed import grey, written
 from mien.capture.folder import ignored_files, photo_files
-from mien.capture.output_folders import made_by_mien
-from mien.capture.source_kind import kind_of_source
+from mien.capture.source_kind import kind_of_source, made_by_mien
 from mien.errors import FileFormatError, InputError
 from mien.io.examples.example_folder import EXAMPLES_FORMAT
 from mien.io.head.head_json import HEAD_FORMAT

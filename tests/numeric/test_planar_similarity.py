@@ -25,7 +25,7 @@ def test_recovers_a_known_motion(neutral):
 
 def test_undo_undoes(rng, neutral):
     points = rng.normal(size=(20, 2))
-    np.testing.assert_allclose(TRUE.undo(TRUE(points)), points, atol=1e-12)
+    np.testing.assert_allclose(TRUE.inverse(TRUE(points)), points, atol=1e-12)
 
 
 def test_any_other_motion_is_further_off(rng, neutral):

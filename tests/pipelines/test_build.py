@@ -15,7 +15,7 @@ from mien.errors import EstimationError
 from mien.pipelines.build import Build, BuildOptions, build_head
 from mien.reconstruction.fit import FitOptions
 from mien.reconstruction.registration import NOTHING_SHARED
-from mien.rig.expression_textures import paint_expressions
+from mien.rig.expression_textures import extract_expression_textures
 from mien.texture.extract import Texture
 from mien.texture.surface import SurfaceMap
 from people import camera, person, photographed
@@ -51,10 +51,10 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
         seen.photographed = {
             name: [photo[0, 0, 0] for photo in item.photos] for name, item in photographed.items()
         }
-        return paint_expressions(mesh, photographed, *others)
+        return extract_expression_textures(mesh, photographed, *others)
 
-    monkeypatch.setattr("mien.pipelines.build.extract_texture", grey)
-    monkeypatch.setattr("mien.pipelines.build.paint_expressions", paint)
+    monkeypatch.setattr("mien.pipelines.head_textures.extract_texture", grey)
+    monkeypatch.setattr("mien.pipelines.head_textures.extract_expression_textures", paint)
     return seen
 
 
@@ -76,8 +76,8 @@ def test_a_head_of_one_expression(calls: SimpleNamespace) -> None:
         photo = fit.photos[item.photo]
         assert item.camera is photo.camera
         assert item.rms_px == photo.rms_px
-        assert item.points_used == len(photo.trusted)
-        assert item.distrusted == {m.name: m.verdict for m in photo.marks if m.verdict}
+        assert item.points_used == len(photo.inliers)
+        assert item.distrusted == {m.name: m.rejection for m in photo.marks if m.rejection}
     assert result.notes == ("a.png: blurred", NOTHING_SHARED)
 
 

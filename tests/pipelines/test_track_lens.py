@@ -37,7 +37,7 @@ def test_every_fifth_of_the_first_frames_is_looked_at(
     clip = Video(written(tmp_path / "a.mp4", frames))
     told: list[tuple[str, int, int]] = []
     ready = ReadyHead(head(), None, TrackOptions())
-    focal_px, note = find_focal(clip, clip.facts(), ready, lambda *step: told.append(step))
+    focal_px, note = find_focal(clip, clip.info(), ready, lambda *step: told.append(step))
     assert (focal_px, note) == (800.0, "a note"), "of the pictures at their full size"
     assert [picture.mean() for picture in seen] == pytest.approx([20, 70, 120], abs=3)
     assert {picture.shape for picture in seen} == {(24, 32, 3)}

@@ -19,8 +19,9 @@ from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.similarity import estimate_similarity
 from mien.reconstruction import fit as fitting
-from mien.reconstruction.fit import ONE_SIDE, Fit, FitOptions, fit_views
+from mien.reconstruction.fit import ONE_SIDE, FitOptions, fit_views
 from mien.reconstruction.registration import NOTHING_SHARED
+from mien.reconstruction.result import NeutralFit
 from mien.reconstruction.shape.deformation import eye_centers
 from people import (
     PX_PER_MM,
@@ -44,7 +45,7 @@ def views_of(seen_from: list[Camera], **marks: object) -> list[CapturedView]:
     ]
 
 
-def found_cameras(fit: Fit) -> list[Camera]:
+def found_cameras(fit: NeutralFit) -> list[Camera]:
     return [item.camera for item in fit.photos.values()]
 
 
@@ -60,13 +61,13 @@ QUICK = FitOptions(rounds=1, dense=False)
 
 
 @cache
-def exact_fit(*, adjust: bool = True) -> Fit:
+def exact_fit(*, adjust: bool = True) -> NeutralFit:
     """Every feature marked exactly in five photos."""
     return fit_views(views_of(FIVE), GENERIC, FitOptions(adjust=adjust, dense=False))
 
 
 @cache
-def three_fit() -> Fit:
+def three_fit() -> NeutralFit:
     """Some features marked exactly in three photos."""
     return fit_views(views_of(FIVE[1:4], points=MARKS), GENERIC, QUICK)
 
@@ -92,7 +93,7 @@ def test_the_shape_of_exact_marks(adjust: bool) -> None:
     assert max(item.rms_px for item in fit.photos.values()) < 0.5 * PX_PER_MM
     assert not fit.left_out
     assert not fit.notes
-    assert all(not mark.verdict for item in fit.photos.values() for mark in item.marks)
+    assert all(not mark.rejection for item in fit.photos.values() for mark in item.marks)
 
 
 def test_a_perfect_detector_alone() -> None:
@@ -121,7 +122,7 @@ def test_marks_tell_where_the_model_puts_them() -> None:
             np.testing.assert_allclose(mark.residual_px, projected[index] - seen, atol=1e-6)
             assert mark.distance_px == pytest.approx(np.linalg.norm(mark.residual_px))
             assert mark.by_hand
-        squares = [mark.distance_px**2 for mark in item.trusted]
+        squares = [mark.distance_px**2 for mark in item.inliers]
         assert item.rms_px == pytest.approx(np.sqrt(np.mean(squares)))
 
 
@@ -198,7 +199,7 @@ def test_a_slipped_mark_is_distrusted_and_changes_little() -> None:
         (name, mark.name)
         for name, item in fit.photos.items()
         for mark in item.marks
-        if mark.verdict
+        if mark.rejection
     }
     assert verdicts == {("0.png", "nose_tip")}
     degrees, focal = camera_errors(found_cameras(fit), found_cameras(three_fit()))

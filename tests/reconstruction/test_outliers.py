@@ -10,8 +10,6 @@ import pytest
 from mien.assets.generic import load_generic_head
 from mien.reconstruction.features import gather_features
 from mien.reconstruction.outliers import (
-    Mark,
-    PhotoFit,
     depth_notes,
     find_misfit,
     judge_marks,
@@ -19,6 +17,7 @@ from mien.reconstruction.outliers import (
     typical_misfits,
     view_spread,
 )
+from mien.reconstruction.result import Mark, PhotoFit
 from people import camera, person, photographed
 
 
@@ -34,7 +33,7 @@ def photo_fit(distrusted: int, of: int, *, by_hand: bool = True) -> PhotoFit:
 
 def test_a_photo_counts_by_its_trusted_marks() -> None:
     fit = photo_fit(2, 10)
-    assert len(fit.trusted) == 8
+    assert len(fit.inliers) == 8
     assert fit.rms_px == pytest.approx(5.0)
     assert photo_fit(3, 3).rms_px == 0.0
 
@@ -100,7 +99,7 @@ def test_a_mark_far_off_its_expected_error_gets_a_verdict(sigmas: float, verdict
     residuals, sigma_px = np.zeros((len(features.names), 2)), np.full(len(features.names), 2.0)
     residuals[1] = [0.6 * 2 * sigmas, -0.8 * 2 * sigmas]
     first, second = judge_marks(features, 0, residuals, sigma_px)
-    assert (first.verdict, second.verdict) == ("", verdict)
+    assert (first.rejection, second.rejection) == ("", verdict)
     assert second.distance_px == pytest.approx(2 * sigmas)
     assert second.by_hand
     np.testing.assert_array_equal(second.image_point, features.image_points[0, 1])

@@ -8,8 +8,8 @@ import pytest
 
 from mien.assets.generic import load_generic_head
 from mien.head import Expression, FittedView, Head
-from mien.reconstruction.fit import Fit, FitOptions, fit_views
-from mien.reconstruction.outliers import Mark, PhotoFit
+from mien.reconstruction.fit import FitOptions, fit_views
+from mien.reconstruction.result import Mark, NeutralFit, PhotoFit
 from mien.render.orbit import orbit_camera
 from mien.report import ReportInput, render_report
 from mien.report.page import head_angles_deg
@@ -30,11 +30,11 @@ def report_input() -> ReportInput:
     photo = fit.photos[NAMES[0]]
     slipped = Mark("chin", np.array([5.0, 7.0]), np.array([30.0, 40.0]), True, "99 times off")
     marks = tuple(slipped if mark.name == "chin" else mark for mark in photo.marks)
-    fit = Fit(
+    fit = NeutralFit(
         fit.vertices,
         {**fit.photos, NAMES[0]: PhotoFit(photo.camera, marks)},
         fit.left_out,
-        fit.uncertainty_mm,
+        uncertainty_mm=fit.uncertainty_mm,
     )
     head = Head(
         subject="Zoë <script>",
@@ -43,7 +43,7 @@ def report_input() -> ReportInput:
             "neutral": Expression(
                 fit.vertices,
                 tuple(
-                    FittedView(name, item.camera, item.rms_px, len(item.trusted))
+                    FittedView(name, item.camera, item.rms_px, len(item.inliers))
                     for name, item in fit.photos.items()
                 ),
             )
@@ -71,7 +71,7 @@ def test_every_photo_has_its_line_and_its_picture(page: str, report_input: Repor
         (line,) = [row for row in rows if row[0] == name]
         assert line[1] == f"1000 {chr(215)} 1300"
         assert line[2] == f"{item.camera.focal_px:.0f}"
-        assert line[-2:] == [str(len(item.trusted)), f"{item.rms_px:.2f}"]
+        assert line[-2:] == [str(len(item.inliers)), f"{item.rms_px:.2f}"]
         assert f'alt="{html.escape(name)} with the mesh"' in page
 
 
@@ -85,7 +85,7 @@ def test_every_mark_has_its_line(page: str, report_input: ReportInput) -> None:
         assert {row[0] for row in rows} == {mark.name for mark in item.marks}
         shown = {row[0]: row[3:] for row in rows}
         for mark in item.marks:
-            assert shown[mark.name] == [f"{mark.distance_px:.2f}", mark.verdict or "by hand"]
+            assert shown[mark.name] == [f"{mark.distance_px:.2f}", mark.rejection or "by hand"]
         lengths = [float(row[3]) for row in rows]
         assert lengths == sorted(lengths, reverse=True)
 

@@ -9,7 +9,7 @@ from PIL import Image
 
 from mien.assets.generic import load_generic_head
 from mien.head import Expression, Head
-from mien.reconstruction.outliers import Mark, PhotoFit
+from mien.reconstruction.result import Mark, PhotoFit
 from mien.report.pictures import coverage_pictures, overlay_picture, preview_pictures
 from people import camera
 

@@ -27,7 +27,7 @@ _ASPECT_TOLERANCE = 0.005
 
 @dataclass(frozen=True)
 class AnnotationNames:
-    """What may be marked.
+    """The names that annotations may use.
 
     Attributes:
         points: names of single points: [Pighin 2002]'s 13, and every vertex of a polyline
@@ -72,6 +72,11 @@ def load_annotations(path: str | Path, photo: Photo, *, names: AnnotationNames) 
 
     The file's pixels are those of the photo after EXIF orientation at the size that it states (by
     default the photo's own); a photo that was reduced while loading has its marks reduced alike.
+
+    Args:
+        path: the annotation file.
+        photo: the photo that it belongs to.
+        names: that it may use.
 
     Raises:
         InputError: the file cannot be read.
@@ -118,7 +123,7 @@ def save_annotations(path: str | Path, photo: Photo, annotations: Annotations) -
 
 
 def _rounded(places: Array) -> Any:
-    """Thousandths of a pixel are finer than any hand."""
+    """To thousandths of a pixel, finer than any hand."""
     return np.round(places, 3).tolist()
 
 

@@ -1,4 +1,4 @@
-"""Which files of a folder are photos, of which expression, and which are not used."""
+"""The photos of a folder, by expression, and the files that are not used."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from pathlib import Path
 
 from mien.capture.images.opening import is_image
 from mien.capture.images.photos import PHOTO_SUFFIXES
-from mien.capture.images.unsupported import counted, is_unread
-from mien.capture.output_folders import made_by_mien
-from mien.capture.source_kind import VIDEO_SUFFIXES, kind_of_source
+from mien.capture.images.unsupported import count_by_kind, is_unsupported
+from mien.capture.source_kind import VIDEO_SUFFIXES, kind_of_source, made_by_mien
 from mien.errors import InputError, escaped
 from mien.expression_names import check_expression_folders
 from mien.head import NEUTRAL
@@ -17,14 +16,14 @@ from mien.reading.names import list_folder, portable_name
 
 ANNOTATIONS = "annotations"
 _DOCUMENTS = frozenset({"COPYING", "CREDITS", "LICENCE", "LICENSE", "NOTICE", "README"})
-"""Files that often lie beside photos and that nobody takes for one."""
+"""Files that often lie beside photos: no note is made of them."""
 
 
 def photo_files(source: Path) -> dict[str, list[Path]]:
     """Photos by expression, `neutral` first, each in natural order.
 
     Raises:
-        InputError: as kind_of_source; a folder without photos: says what is there instead.
+        InputError: as kind_of_source; a folder without photos: names what it holds.
     """
     if kind_of_source(source) != "folder":
         return {NEUTRAL: [source]}
@@ -36,7 +35,7 @@ def photo_files(source: Path) -> dict[str, list[Path]]:
     folders = {name: paths for name, paths in folders.items() if paths}
     if not folders:
         expected = "photos in this folder or in folders within (JPEG, PNG, TIFF, WebP, HEIC, ...)"
-        raise InputError(source, expected, "; ".join(_instead(source)) or "none")
+        raise InputError(source, expected, "; ".join(_other_content(source)) or "none")
     return dict(sorted(folders.items(), key=lambda item: item[0] != NEUTRAL))
 
 
@@ -76,7 +75,7 @@ def orphaned_annotations(photos: Sequence[Path]) -> list[str]:
     ]
 
 
-def _instead(source: Path) -> list[str]:
+def _other_content(source: Path) -> list[str]:
     """What lies in a folder without photos, in it or one level down."""
     folders = _subfolders(source)
     there = [path for folder in (source, *folders) for path in _files_in(folder)]
@@ -93,9 +92,9 @@ def _instead(source: Path) -> list[str]:
 
 
 def _unread(there: Sequence[Path]) -> list[str]:
-    """Of these files the pictures and clips that are not read, by kind."""
+    """The pictures and clips among these files that are not read, by kind."""
     clips = [path for path in there if _is_clip(path)]
-    found = counted(path for path in there if is_unread(path))
+    found = count_by_kind(path for path in there if is_unsupported(path))
     if clips:
         count = f"{len(clips)} video{'s' * (len(clips) > 1)}"
         found.append(f"{count}, as {clips[0].name} (give a video itself as the source)")
@@ -112,7 +111,7 @@ def _photos_in(folder: Path) -> list[Path]:
 
 
 def _files_in(folder: Path) -> list[Path]:
-    """Pipes and devices, too, so that one with a photo's name is refused by it."""
+    """All but folders; also pipes and devices, so that one with a photo's name is refused."""
     return [path for path in list_folder(folder) if not path.is_dir()]
 
 
@@ -127,7 +126,7 @@ def _folders_in(folder: Path) -> list[Path]:
 
 
 def _is_stray(path: Path) -> bool:
-    known = _is_photo(path) or _is_clip(path) or is_unread(path)
+    known = _is_photo(path) or _is_clip(path) or is_unsupported(path)
     return not known and path.stem.upper() not in _DOCUMENTS
 
 
@@ -136,7 +135,7 @@ def _is_clip(path: Path) -> bool:
 
 
 def _is_photo(path: Path) -> bool:
-    """By its ending; what has none is looked into."""
+    """By its ending; without one, by its content."""
     if not path.suffix:
         return path.is_file() and path.name not in _DOCUMENTS and is_image(path)
     return path.suffix.lower() in PHOTO_SUFFIXES

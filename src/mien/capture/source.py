@@ -1,4 +1,4 @@
-"""Whatever a user has of a person, as photos with landmarks and annotations."""
+"""Photos or a video of a person, as photos with landmarks and annotations."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from mien.arrays import Array, Float, UInt8
 from mien.capture.annotations import AnnotationNames, Annotations, load_annotations
-from mien.capture.duplicates import same_photo
 from mien.capture.faces.detector import NO_FACE_FOUND, LandmarkDetector, NoFaceError
 from mien.capture.faces.landmarks import Landmarks
 from mien.capture.faces.mediapipe_face import yaw_pitch
@@ -20,27 +20,30 @@ from mien.capture.folder import (
     photo_files,
 )
 from mien.capture.images.photos import DEFAULT_MAX_SIDE, Photo, load_photo
-from mien.capture.notes import gathered_notes
+from mien.capture.notes import merge_notes
 from mien.capture.source_kind import kind_of_source
 from mien.capture.video.picked_frames import pick_frames
 from mien.errors import EstimationError
 from mien.progress import StepProgress
 from mien.reading.names import portable_name
 
-TO_BE_PLACED = "no face found; the other photos tell where it was taken from, if they can"
-"""Noted of a photo that shows a profile, perhaps, or nobody."""
+NO_FACE_YET = "no face found; the other photos tell where it was taken from, if they can"
+"""Noted of a photo without a detected face: a profile, perhaps, or nobody."""
 
-_ONE_VIEWPOINT = 10.0
+_ONE_VIEWPOINT_DEG = 10.0
+_THUMBNAIL_SIDE = 32
+_SAME_BRIGHTNESS = 1.0
+_SAME_LANDMARKS = 0.02
 
 
 @dataclass(frozen=True)
 class CapturedView:
-    """One photo of the person and what is known of the face in it.
+    """One photo of the person, with the landmarks and annotations of the face.
 
     Attributes:
         photo: the picture.
         landmarks: the detector's, or None where it finds no face (a profile, say).
-        annotations: hand-made marks, which win over landmarks, or None.
+        annotations: drawn by hand, which replace landmarks, or None.
     """
 
     photo: Photo
@@ -49,7 +52,7 @@ class CapturedView:
 
     @property
     def marked(self) -> bool:
-        """Whether it is known of any point where the photo shows it."""
+        """Whether the photo has landmarks or annotations."""
         return self.landmarks is not None or self.annotations is not None
 
 
@@ -84,11 +87,11 @@ def load_capture(
     names: AnnotationNames | None = None,
     progress: StepProgress | None = None,
 ) -> Capture:
-    """Photos from a folder, expression folders, one photo or a video, with all that is known.
+    """The photos of a folder, of expression folders, or of a video, with landmarks and annotations.
 
-    A photo in which no face is found stays if others of its expression show one, for they may tell
-    where it was taken from. Any other photo without a usable face and without annotations is left
-    out. Notes tell of both.
+    A photo in which no face is found stays if others of its expression show one: they may give its
+    camera. Any other photo without a usable face and without annotations is left out. There is a
+    note on each.
 
     Args:
         source: a folder of photos, a folder of one folder an expression, a photo or a video.
@@ -98,7 +101,7 @@ def load_capture(
         frames: how many frames of a video to use at most for the face at rest.
         expressions: how many other expressions of a video at most; None takes those that differ.
         names: what annotations may name; None takes the generic head's names.
-        progress: told after every photo or frame.
+        progress: called after every photo or frame.
 
     Raises:
         InputError: there is nothing at `source`, or no photo in it.
@@ -114,11 +117,11 @@ def load_capture(
             found = reader.from_photos(source)
     found = {name: views for name, views in found.items() if views}
     if not found:
-        reasons = [f"{photo}: {note}" for photo, note in reader.told if "left out" in note]
+        reasons = [f"{photo}: {note}" for photo, note in reader.picture_notes if "left out" in note]
         raise EstimationError(
             f"{source}: no photo shows a face that can be used ({'; '.join(reasons[:3])})"
         )
-    notes = (*reader.notes, *gathered_notes(reader.told), *_viewpoint_notes(found))
+    notes = (*reader.notes, *merge_notes(reader.picture_notes), *_viewpoint_notes(found))
     name = portable_name(source.with_suffix("") if source.is_file() else source.resolve())
     return Capture(name, found, notes)
 
@@ -137,7 +140,7 @@ class _Reader:
         self.detector, self.max_side, self.face = detector, max_side, face
         self.names, self.progress = names, progress
         self.notes: list[str] = []
-        self.told: list[tuple[str, str]] = []
+        self.picture_notes: list[tuple[str, str]] = []
 
     def from_photos(self, source: Path) -> dict[str, tuple[CapturedView, ...]]:
         """Every photo of every expression, each with the annotations beside it."""
@@ -154,13 +157,13 @@ class _Reader:
                 if self.progress is not None:
                     self.progress(done, total)
             self.notes += orphaned_annotations(paths)
-            expressions[expression] = self._settled(views)
+            expressions[expression] = self._with_face(views)
         return expressions
 
     def from_video(
         self, source: Path, count: int, expressions: int | None
     ) -> dict[str, tuple[CapturedView, ...]]:
-        """The chosen frames by expression."""
+        """The selected frames by expression."""
         picked = pick_frames(
             source,
             count=count,
@@ -175,13 +178,13 @@ class _Reader:
             views: list[CapturedView] = []
             for photo in photos:
                 self._add(views, photo, None)
-            found[name] = self._settled(views)
+            found[name] = self._with_face(views)
         return found
 
     def _add(
         self, views: list[CapturedView], photo: Photo, annotations: Annotations | None
     ) -> None:
-        """The photo as another view, unless its face is of no use or it is there already."""
+        """Add the photo as a view, unless its face cannot be used or it is a duplicate."""
         notes = list(photo.notes)
         landmarks, usable = None, True
         try:
@@ -198,19 +201,19 @@ class _Reader:
             notes += annotations.notes
         if usable:
             view = CapturedView(photo, landmarks, annotations)
-            twin = next((other for other in views if same_photo(view, other)), None)
-            if twin is None or annotations is not None:
+            duplicate = next((other for other in views if _is_same_photo(view, other)), None)
+            if duplicate is None or annotations is not None:
                 views.append(view)
             else:
-                notes.append(f"left out: the same photo as {twin.photo.name}")
-        self.told += [(photo.name, note) for note in notes]
+                notes.append(f"left out: the same photo as {duplicate.photo.name}")
+        self.picture_notes += [(photo.name, note) for note in notes]
 
-    def _settled(self, views: list[CapturedView]) -> tuple[CapturedView, ...]:
-        """Photos without a face stay if any other photo of the expression has one."""
-        anchored = any(view.marked for view in views)
-        what = TO_BE_PLACED if anchored else f"left out: {NO_FACE_FOUND}"
-        self.told += [(view.photo.name, what) for view in views if not view.marked]
-        return tuple(views) if anchored else ()
+    def _with_face(self, views: list[CapturedView]) -> tuple[CapturedView, ...]:
+        """The views if any has landmarks or annotations, those without included; otherwise none."""
+        has_face = any(view.marked for view in views)
+        note = NO_FACE_YET if has_face else f"left out: {NO_FACE_FOUND}"
+        self.picture_notes += [(view.photo.name, note) for view in views if not view.marked]
+        return tuple(views) if has_face else ()
 
     def _annotations_of(self, path: Path, photo: Photo) -> Annotations | None:
         file = path.parent / ANNOTATIONS / f"{path.stem}.json"
@@ -234,9 +237,42 @@ def _viewpoint_notes(expressions: dict[str, tuple[CapturedView, ...]]) -> list[s
         if len(poses) < 2 or len(poses) < len(views):
             continue
         span = np.degrees(np.ptp(poses, axis=0))
-        if span.max() < _ONE_VIEWPOINT:
+        if span.max() < _ONE_VIEWPOINT_DEG:
             notes.append(
                 f"{name}: its {len(views)} photos look from nearly one side (yaw spans "
                 f"{span[0]:.0f} degrees, pitch {span[1]:.0f}): they say little about depth"
             )
     return notes
+
+
+def _is_same_photo(one: CapturedView, other: CapturedView) -> bool:
+    """Equal pixels, or a copy that was saved again or resized.
+
+    Copies differ by some tenths of a grey level in the mean of a 32x32 thumbnail, and in their
+    landmarks by 1 % of the distance between the eyes, the repeatability of the detector.
+    """
+    first, second = one.photo.pixels, other.photo.pixels
+    if first.shape == second.shape and np.array_equal(first, second):
+        return True
+    if one.landmarks is None or other.landmarks is None:
+        return False
+    aspect = np.log(first.shape[0] * second.shape[1] / (first.shape[1] * second.shape[0]))
+    if abs(aspect) > 0.01:
+        return False
+    difference = np.abs(_thumbnail(first) - _thumbnail(second)).mean()
+    return bool(difference < _SAME_BRIGHTNESS) and _have_same_landmarks(
+        one.landmarks, other.landmarks, first.shape[1] / second.shape[1]
+    )
+
+
+def _have_same_landmarks(one: Landmarks, other: Landmarks, factor: float) -> bool:
+    """After scaling the second photo by `factor` to the first one's size."""
+    moved = np.linalg.norm(one.points - factor * other.points, axis=1)
+    return bool(np.median(moved) < _SAME_LANDMARKS * one.eye_distance_px)
+
+
+def _thumbnail(pixels: UInt8[Array, "h w 3"]) -> Float[Array, "t t 3"]:
+    import cv2
+
+    size = (_THUMBNAIL_SIDE, _THUMBNAIL_SIDE)
+    return cv2.resize(pixels, size, interpolation=cv2.INTER_AREA).astype(np.float64)

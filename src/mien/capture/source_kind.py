@@ -1,14 +1,14 @@
-"""What a user's source is: told by its bytes, not by its name."""
+"""The kind of a user's source: by its bytes first, then by its name."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Literal
 
 from mien.capture.images.opening import is_image
 from mien.capture.images.photos import PHOTO_SUFFIXES
-from mien.capture.images.unsupported import unread_kind
-from mien.capture.output_folders import made_by_mien
+from mien.capture.images.unsupported import unsupported_kind
 from mien.capture.video.video import is_video
 from mien.errors import FileFormatError, InputError
 from mien.reading.files import check_readable, describe_content
@@ -20,16 +20,23 @@ _VIDEO_SUFFIXES = (
     ".mpeg .mpg .mts .mxf .ogm .ogv .qt .rm .tod .ts .vob .webm .wmv"
 )
 VIDEO_SUFFIXES = frozenset(_VIDEO_SUFFIXES.split())
-"""Endings (lower case) of what is meant as a video, where its bytes do not tell."""
+"""Endings (lower case) of files that count as videos where their bytes are not recognized."""
+
+_INDEXES = {
+    "head.json": (rb'"format"\s*:\s*"mien head"', "a head folder"),
+    "examples.json": (rb'"format"\s*:\s*"mien examples"', "an example folder"),
+}
+_BEGINNING = 4096
+"""Bytes within which both kinds of index state their format."""
 
 SourceKind = Literal["folder", "photo", "video"]
 
 
 def kind_of_source(source: str | Path) -> SourceKind:
-    """What every command that takes photos or a video makes of a source.
+    """Whether a source is a folder, a photo or a video.
 
-    A picture that moves (a GIF, an animated PNG) is a video. What cannot be told is what its name
-    says: whoever reads it will say what is wrong with it.
+    An animated picture (GIF, PNG) is a video. A file whose bytes are not recognized is what its
+    name says: its reader will find what is wrong with it.
 
     Raises:
         InputError: nothing given, nothing there, a folder that mien made, a pipe, a device.
@@ -45,7 +52,7 @@ def kind_of_source(source: str | Path) -> SourceKind:
     check_readable(path, "a photo or a video")
     if is_image(path):
         return "photo"
-    unread, suffix = unread_kind(path), path.suffix.lower()
+    unread, suffix = unsupported_kind(path), path.suffix.lower()
     if not unread and (is_video(path) or suffix in VIDEO_SUFFIXES):
         return "video"
     if suffix in PHOTO_SUFFIXES:
@@ -53,3 +60,18 @@ def kind_of_source(source: str | Path) -> SourceKind:
     raise FileFormatError(
         path, f"expected a photo or a video, found {unread or describe_content(path)}"
     )
+
+
+def made_by_mien(folder: Path) -> str:
+    """What kind of folder mien wrote here: "a head folder", "an example folder"; "" for others."""
+    for name, (pattern, kind) in _INDEXES.items():
+        index = folder / name
+        try:
+            # Opening a pipe would wait.
+            if index.is_file():
+                with index.open("rb") as file:
+                    if re.search(pattern, file.read(_BEGINNING)):
+                        return kind
+        except OSError:
+            continue
+    return ""

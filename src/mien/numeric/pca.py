@@ -1,4 +1,4 @@
-"""Principal components of a few rows of many numbers."""
+"""Principal component analysis of a few long rows."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mien.errors import InputError
 __all__ = ["Pca", "fit_pca"]
 
 _RANK_TOLERANCE = 1e-10
-"""Deviations below this part of the greatest are rounding errors."""
+"""Singular values below this part of the greatest are rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -20,11 +20,10 @@ class Pca:
     """The affine subspace in which rows vary most.
 
     Attributes:
-        mean: (D,) where the subspace lies.
+        mean: (D,) a point of the subspace.
         components: (C, D) orthonormal, the one of greatest variance first.
         deviations: (C,) standard deviations of the rows along the components.
-        residual: standard deviation per number of what the components leave; 0 when they leave
-            nothing.
+        residual: standard deviation per coordinate outside of the subspace.
     """
 
     mean: Float[Array, " d"]
@@ -33,11 +32,11 @@ class Pca:
     residual: float
 
     def coefficients(self, rows: Float[Array, "*n d"]) -> Float[Array, "*n c"]:
-        """Where the points of the subspace nearest to the rows are, along its components."""
+        """Coordinates, along the components, of the rows' projections onto the subspace."""
         return (rows - self.mean) @ self.components.T
 
     def project(self, rows: Float[Array, "*n d"]) -> Float[Array, "*n d"]:
-        """The points of the subspace nearest to the rows."""
+        """The rows' projections onto the subspace."""
         return self.mean + self.coefficients(rows) @ self.components
 
 
@@ -60,14 +59,14 @@ def fit_pca(rows: Float[Array, "n d"], components: int, *, centred: bool = True)
         raise InputError("components", "a number from 1 on", components)
     mean = rows.mean(axis=0) if centred else np.zeros(rows.shape[1])
     _, singular, directions = np.linalg.svd(rows - mean, full_matrices=False)
-    freedom = len(rows) - centred
+    degrees_of_freedom = len(rows) - centred
     rank = int(np.count_nonzero(singular > _RANK_TOLERANCE * max(singular[0], np.abs(rows).max())))
     kept = min(components, rank)
-    left = rows.shape[1] - kept
-    variance = float((singular[kept:rank] ** 2).sum()) / freedom / max(left, 1)
+    rest = rows.shape[1] - kept
+    variance = float((singular[kept:rank] ** 2).sum()) / degrees_of_freedom / max(rest, 1)
     return Pca(
         frozen(mean),
         frozen(directions[:kept]),
-        frozen(singular[:kept] / np.sqrt(freedom)),
+        frozen(singular[:kept] / np.sqrt(degrees_of_freedom)),
         float(np.sqrt(variance)),
     )

@@ -1,4 +1,4 @@
-"""Similarities (scale, rotation, translation) in the plane, estimated, done and undone."""
+"""Similarities (scale, rotation, translation) in the plane."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from mien.errors import EstimationError, InputError
 
 __all__ = ["PlanarSimilarity", "estimate_planar_similarity"]
 
-_LEAST_SPREAD = 1e-9
-"""Points nearer to each other than this part of their coordinates are one place."""
+_MIN_SPREAD = 1e-9
+"""Points nearer to each other than this part of their coordinates coincide."""
 
 
 @dataclass(frozen=True)
@@ -20,8 +20,8 @@ class PlanarSimilarity:
     """(x, y) -> [[a, -b], [b, a]] (x, y) + (tx, ty), one or a batch of any shape.
 
     Attributes:
-        a: (...) scale times cosine and sine of the rotation.
-        b: (...) scale times cosine and sine of the rotation.
+        a: (...) scale times the cosine of the rotation.
+        b: (...) scale times the sine of the rotation.
         translation: (..., 2) px.
 
     Source:
@@ -34,15 +34,15 @@ class PlanarSimilarity:
 
     @property
     def scale(self) -> Float[Array, "*batch"]:
-        """How much larger things have become."""
+        """Ratio of lengths after the motion to those before."""
         return np.hypot(self.a, self.b)
 
     def __call__(self, points: Float[Array, "*batch n 2"]) -> Float[Array, "*batch n 2"]:
-        """The points moved."""
+        """The points after the motion."""
         return _turned(self.a, self.b, points) + self.translation[..., None, :]
 
-    def undo(self, points: Float[Array, "*batch n 2"]) -> Float[Array, "*batch n 2"]:
-        """The points as they were before they moved."""
+    def inverse(self, points: Float[Array, "*batch n 2"]) -> Float[Array, "*batch n 2"]:
+        """The points before the motion, from those after it."""
         squared = self.scale**2
         return _turned(self.a / squared, -self.b / squared, points - self.translation[..., None, :])
 
@@ -53,12 +53,12 @@ def estimate_planar_similarity(
     """The similarities in the plane that take source nearest to target by least squares.
 
     Args:
-        source: (N, 2), N >= 2, not all in one place.
+        source: (N, 2), N >= 2, that do not all coincide.
         target: (..., N, 2) the same points after the motion.
 
     Raises:
         InputError: shapes, NaN, fewer than two points.
-        EstimationError: source or what a target shows of it lies in one place.
+        EstimationError: the points of the source coincide, or those of a target do.
 
     Source:
         [Zhang 2006] sec. 12, eq. (8), (9).
@@ -85,8 +85,8 @@ def _turned(a: Array, b: Array, points: Array) -> Array:
 
 
 def _check_spread(what: str, spread: Array | float, points: Array) -> None:
-    """Squared distances from the middle, summed, against the size of the numbers."""
-    if (np.asarray(spread) <= (_LEAST_SPREAD * np.abs(points).max(initial=1e-300)) ** 2).any():
+    """Compare squared distances from the mean, summed, with the size of the numbers."""
+    if (np.asarray(spread) <= (_MIN_SPREAD * np.abs(points).max(initial=1e-300)) ** 2).any():
         raise EstimationError(
             f"motion in the plane needs points apart from each other; {what} share a place"
         )

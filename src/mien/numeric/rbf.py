@@ -15,7 +15,7 @@ __all__ = ["PAPER_RADIUS", "Rbf", "fit_rbf"]
 PAPER_RADIUS = 64 * 25.4
 """64 inches in mm: the radius of [Pighin 2002]'s kernel."""
 
-# Signs make every kernel conditionally positive definite, so that smoothing smooths. The
+# Signs make every kernel conditionally positive definite, as smoothing requires. The
 # exponential is written less 1, which the side condition sum(c) = 0 cancels: with the radius of
 # [Pighin 2002] all its values lie near 1 and the constant would cost half the digits.
 KERNELS: dict[str, Callable[[Array], Array]] = {
@@ -31,12 +31,13 @@ _MAX_BLOCK = 2_000_000
 
 @dataclass(frozen=True)
 class Rbf:
-    """f(m) = sum_i c_i phi(|m - m_i| / radius) + M m + t. Made by fit_rbf; call it.
+    """f(m) = sum_i c_i phi(|m - m_i| / radius) + M m + t; made by fit_rbf.
 
     Attributes:
         centers: (N, 3) the points m_i.
         coefficients: (N, D) the c_i.
-        origin: (3,) and axes: (A, 3): the affine part's coordinates are axes @ (m - origin).
+        origin: (3,) of the affine part.
+        axes: (A, 3) of the affine part; its coordinates are axes @ (m - origin).
         affine: (1 + A, D) its constant and its slopes along the axes.
         kernel: name.
         radius: what distances are divided by.
@@ -102,7 +103,7 @@ def fit_rbf(
     origin, axes = _affine_frame(points)
     terms = _affine_terms(points, origin, axes)
     matrix = _kernel_matrix(points, points, kernel, radius) + np.diag(ridge)
-    coefficients = _solve_within(matrix, terms, values)
+    coefficients = _solve_constrained(matrix, terms, values)
     affine = np.linalg.lstsq(terms, values - matrix @ coefficients, rcond=None)[0]
     return Rbf(points, coefficients, origin, axes, affine, kernel, radius)
 
@@ -155,10 +156,10 @@ def _kernel_matrix(a: Array, b: Array, kernel: str, radius: float) -> Float[Arra
     return KERNELS[kernel](cdist(a, b) / radius)
 
 
-def _solve_within(matrix: Array, terms: Array, values: Array) -> Float[Array, "n d"]:
+def _solve_constrained(matrix: Array, terms: Array, values: Array) -> Float[Array, "n d"]:
     """Coefficients that meet the side conditions terms^T c = 0.
 
-    Written in a basis of what the conditions leave, the kernel matrix is positive definite.
+    In a basis of the conditions' null space the kernel matrix is positive definite.
     """
     import warnings
 

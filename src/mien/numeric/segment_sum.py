@@ -1,4 +1,4 @@
-"""Sums over the members of groups."""
+"""Segment sums: values added up by the index of their segment."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ from mien.arrays import Array, Float, Int
 
 
 class SegmentSum:
-    """Sums of values by group, prepared once for many calls.
+    """Sums of values by segment, prepared once for many calls; ten times faster than np.add.at.
 
-    np.add.at does the same ten times slower.
+    Args:
+        segment: (M,) index from 0 of the segment that each value belongs to.
+        count: how many segments there are.
     """
 
-    def __init__(self, group: Int[Array, " m"], count: int) -> None:
-        """group: (M,) index from 0 of the group that each value belongs to, of so many."""
+    def __init__(self, segment: Int[Array, " m"], count: int) -> None:
         from scipy.sparse import csr_matrix
 
-        size = len(group)
+        size = len(segment)
         shape = (count, size)
-        self._matrix = csr_matrix((np.ones(size), (group, np.arange(size))), shape=shape)
+        self._matrix = csr_matrix((np.ones(size), (segment, np.arange(size))), shape=shape)
 
-    def __call__(self, values: Float[Array, "m ..."]) -> Float[Array, "g ..."]:
-        """(M, ...) values to (count, ...) sums; zero for a group without members."""
+    def __call__(self, values: Float[Array, "m ..."]) -> Float[Array, "s ..."]:
+        """(M, ...) values to (count, ...) sums; zero for an empty segment."""
         sums: Array = self._matrix @ values.reshape(len(values), math.prod(values.shape[1:]))
         return sums.reshape(-1, *values.shape[1:])

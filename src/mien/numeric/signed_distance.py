@@ -1,4 +1,4 @@
-"""How deep points lie under a surface."""
+"""How deep points lie below a surface: its signed distance where that is negative."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ def penetration_depths(
     vertices: Float[Array, "v 3"],
     triangles: Int[Array, "f 3"],
     border: Bool[Array, " v"],
-    reach: float,
+    max_distance: float,
 ) -> tuple[Float[Array, " n"], Int[Array, " n"], Float[Array, "n 3"]]:
-    """Depth of each point below the nearest place of a surface, and that place.
+    """Depth of each point below a surface, and the surface point nearest to it.
+
+    Interpolated vertex normals separate outside from inside.
 
     Args:
         points: (N, 3).
         vertices: (V, 3).
         triangles: (F, 3), counter-clockwise from outside.
         border: (V,) where the surface ends; nothing is below what touches its border.
-        reach: points further from the surface than this count as outside.
+        max_distance: points farther from the surface than this count as outside.
 
     Returns:
-        (N,) depth, 0 where the point is outside; (N,) triangle of the nearest place, -1 where the
-        point is outside; (N, 3) its barycentric coordinates.
-
-    The surface's normals at its vertices, interpolated, tell outside from inside.
+        (N,) depth, 0 where the point is outside; (N,) triangle of the nearest surface point, -1
+        where the point is outside; (N, 3) its barycentric coordinates.
 
     Source:
-        the nearest place is found as in Ericson, Real-Time Collision Detection, 5.1.5.
+        nearest point of a triangle: Ericson, Real-Time Collision Detection, 5.1.5.
     """
     depth = np.zeros(len(points))
-    place = np.full(len(points), -1, np.int64)
+    nearest = np.full(len(points), -1, np.int64)
     weights = np.zeros((len(points), 3))
-    _depths(points, vertices, triangles, border, reach, depth, place, weights)
-    return depth, place, weights
+    _depths(points, vertices, triangles, border, max_distance, depth, nearest, weights)
+    return depth, nearest, weights
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -46,28 +46,28 @@ def _depths(
     vertices: Array,
     triangles: Array,
     border: Array,
-    reach: float,
+    max_distance: float,
     depth: Array,
-    place: Array,
+    nearest: Array,
     weights: Array,
 ) -> None:
-    middles, sizes = _spheres(vertices, triangles)
+    centres, radii = _spheres(vertices, triangles)
     normals = _normals(vertices, triangles)
     for n in range(len(points)):
-        f, u, v, w = _nearest_triangle(points[n], vertices, triangles, middles, sizes, reach)
+        f, u, v, w = _closest_triangle(points[n], vertices, triangles, centres, radii, max_distance)
         if f < 0:
             continue
         a, b, c = triangles[f]
         # Beyond the surface's end there is no inside.
         if (u > 0 and border[a]) or (v > 0 and border[b]) or (w > 0 and border[c]):
             continue
-        side, away = 0.0, 0.0
+        along_normal, squared = 0.0, 0.0
         for k in range(3):
             off = points[n, k] - u * vertices[a, k] - v * vertices[b, k] - w * vertices[c, k]
-            side += off * (u * normals[a, k] + v * normals[b, k] + w * normals[c, k])
-            away += off * off
-        if side < 0:
-            depth[n], place[n] = np.sqrt(away), f
+            along_normal += off * (u * normals[a, k] + v * normals[b, k] + w * normals[c, k])
+            squared += off * off
+        if along_normal < 0:
+            depth[n], nearest[n] = np.sqrt(squared), f
             weights[n, 0], weights[n, 1], weights[n, 2] = u, v, w
 
 
@@ -88,57 +88,62 @@ def _normals(vertices: Array, triangles: Array) -> Array:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _spheres(vertices: Array, triangles: Array) -> tuple[Array, Array]:
-    """A sphere around each triangle: (3, F) middles and (F,) radii."""
+    """A sphere around each triangle: (3, F) centres and (F,) radii."""
     count = len(triangles)
-    middles, sizes = np.empty((3, count)), np.zeros(count)
+    centres, radii = np.empty((3, count)), np.zeros(count)
     for f in range(count):
         a, b, c = triangles[f]
         for k in range(3):
-            middles[k, f] = (vertices[a, k] + vertices[b, k] + vertices[c, k]) / 3
+            centres[k, f] = (vertices[a, k] + vertices[b, k] + vertices[c, k]) / 3
         for corner in (a, b, c):
-            away = 0.0
+            squared = 0.0
             for k in range(3):
-                away += (vertices[corner, k] - middles[k, f]) ** 2
-            sizes[f] = max(sizes[f], np.sqrt(away))
-    return middles, sizes
+                squared += (vertices[corner, k] - centres[k, f]) ** 2
+            radii[f] = max(radii[f], np.sqrt(squared))
+    return centres, radii
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _nearest_triangle(
-    point: Array, vertices: Array, triangles: Array, middles: Array, sizes: Array, reach: float
+def _closest_triangle(
+    point: Array,
+    vertices: Array,
+    triangles: Array,
+    centres: Array,
+    radii: Array,
+    max_distance: float,
 ) -> tuple[int, float, float, float]:
-    """The triangle nearest to a point, -1 if none is in reach, and where in it."""
-    away = np.empty(len(triangles))
-    _squared_distances(point, middles, away)
-    # The middles are on the surface: the nearest one leaves few triangles to look at.
-    best = min(np.sqrt(away.min()) * (1 + 1e-9), reach)
+    """The triangle nearest to a point, -1 if all are too far, and the barycentrics in it."""
+    squared = np.empty(len(triangles))
+    _squared_distances(point, centres, squared)
+    # The centres are on the surface: the nearest one leaves few triangles to test.
+    best = min(np.sqrt(squared.min()) * (1 + 1e-9), max_distance)
     found, u, v, w = -1, 0.0, 0.0, 0.0
     for f in range(len(triangles)):
-        limit = best + sizes[f]
-        if away[f] >= limit * limit:
+        limit = best + radii[f]
+        if squared[f] >= limit * limit:
             continue
         a, b, c = triangles[f]
-        s, t = _nearest(point, vertices[a], vertices[b], vertices[c])
-        gap = 0.0
+        s, t = _closest_point(point, vertices[a], vertices[b], vertices[c])
+        distance = 0.0
         for k in range(3):
-            place = (1 - s - t) * vertices[a, k] + s * vertices[b, k] + t * vertices[c, k]
-            gap += (point[k] - place) ** 2
-        gap = np.sqrt(gap)
-        if gap < best:
-            best, found, u, v, w = gap, f, 1 - s - t, s, t
+            nearest = (1 - s - t) * vertices[a, k] + s * vertices[b, k] + t * vertices[c, k]
+            distance += (point[k] - nearest) ** 2
+        distance = np.sqrt(distance)
+        if distance < best:
+            best, found, u, v, w = distance, f, 1 - s - t, s, t
     return found, u, v, w
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _squared_distances(point: Array, middles: Array, out: Array) -> None:
+def _squared_distances(point: Array, centres: Array, out: Array) -> None:
     for f in range(len(out)):
-        x, y, z = point[0] - middles[0, f], point[1] - middles[1, f], point[2] - middles[2, f]
+        x, y, z = point[0] - centres[0, f], point[1] - centres[1, f], point[2] - centres[2, f]
         out[f] = x * x + y * y + z * z
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _nearest(p: Array, a: Array, b: Array, c: Array) -> tuple[float, float]:
-    """Weights of b and c of the nearest place in the triangle."""
+def _closest_point(p: Array, a: Array, b: Array, c: Array) -> tuple[float, float]:
+    """Barycentrics at b and c of the triangle's point nearest to p."""
     d1 = d2 = d3 = d4 = d5 = d6 = 0.0
     for k in range(3):
         ab, ac = b[k] - a[k], c[k] - a[k]

@@ -14,13 +14,20 @@ __all__ = ["Similarity", "estimate_similarity"]
 
 @dataclass(frozen=True)
 class Similarity:
-    """target = scale * rotation @ source + translation."""
+    """target = scale * rotation @ source + translation.
+
+    Attributes:
+        scale: above 0.
+        rotation: (3, 3).
+        translation: (3,) in the target's unit.
+    """
 
     scale: float
     rotation: Float[Array, "3 3"]
     translation: Float[Array, " 3"]
 
     def __call__(self, points: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
+        """(N, 3) source points to target points."""
         return self.scale * points @ self.rotation.T + self.translation
 
 
@@ -32,8 +39,8 @@ def estimate_similarity(
     """The similarity that takes source nearest to target in the least-squares sense.
 
     Args:
-        source: (N, 3) corresponding points, N >= 3, not all on one line.
-        target: (N, 3) corresponding points, N >= 3, not all on one line.
+        source: (N, 3), N >= 3, not all on one line.
+        target: (N, 3) the corresponding points.
         weights: (N,) >= 0; equal unless given.
 
     Raises:

@@ -1,8 +1,8 @@
-"""From photos to a head: the whole way, as one function."""
+"""From photos to a textured head with expressions: `build_head`, and its folder."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,26 +14,23 @@ from mien.capture.annotations import save_annotations
 from mien.capture.folder import photo_files
 from mien.capture.source import Capture, load_capture
 from mien.errors import EstimationError
-from mien.head import ATLAS, CYLINDER, NEUTRAL, Expression, FittedView, Head
+from mien.head import ATLAS, NEUTRAL, Expression, FittedView, Head
 from mien.io.files.manifest import kept_notes
 from mien.io.files.video import save_video
 from mien.io.head.head_folder import check_head_place, head_place, write_head
+from mien.pipelines.head_textures import texture_head
 from mien.progress import Progress, StepProgress, no_progress, stage_progress
-from mien.reconstruction.expression.fit import ExpressionFit, fit_expression
+from mien.reconstruction.expression.fit import fit_expression
 from mien.reconstruction.expression.known_head import KnownHead
-from mien.reconstruction.fit import Fit, FitOptions, fit_views
+from mien.reconstruction.fit import FitOptions, fit_views
+from mien.reconstruction.result import ExpressionFit, Fit, NeutralFit
 from mien.render.picture import turntable_frames
 from mien.report import ReportInput, render_report
-from mien.rig.contacts.contacts import Contacts, fit_units
-from mien.rig.contacts.lip_closing import meet_lips
-from mien.rig.expression_textures import Photographed, paint_expressions
+from mien.rig.contacts.lips import close_lips
+from mien.rig.deformer import Contacts, fit_units
 from mien.rig.gaze import with_turned_eyes
 from mien.rig.regions import default_masks
-from mien.texture.atlas import atlas_surface
-from mien.texture.cylinder import cylinder_surface, fit_cylinder
-from mien.texture.extract import Texture, extract_texture
 from mien.texture.fill import Fill
-from mien.texture.surface import SurfaceMap
 
 SOLVING = "Solving cameras and shape"
 REPORTING = "Writing the report"
@@ -78,7 +75,7 @@ class Build:
 
     head: Head
     capture: Capture
-    fits: dict[str, Fit | ExpressionFit]
+    fits: dict[str, Fit]
     coverage: Float[Array, "h w"]
     kept: tuple[str, ...] = ()
 
@@ -117,23 +114,26 @@ def build_head(
         FileFormatError: a photo, a video or an annotation file is damaged.
         EstimationError: no photo fits.
     """
-    options = options or BuildOptions()
-    tell = progress or no_progress
+    options, progress = options or BuildOptions(), progress or no_progress
     _check_neutral(Path(source))
     generic = load_generic_head()
-    capture = load_capture(
-        source,
-        face=options.face,
-        frames=options.frames,
-        expressions=options.expressions,
-        progress=stage_progress(tell, "Finding faces"),
+    capture = _load_capture(source, options, stage_progress(progress, "Finding faces"))
+    solving = stage_progress(progress, SOLVING)
+    neutral, known = _fit_neutral(capture, generic, options.fit, solving)
+    expressions, notes = _fit_expressions(capture, known, solving)
+    fits: dict[str, Fit] = {NEUTRAL: neutral, **expressions}
+    capture = replace(
+        capture,
+        expressions={name: capture.expressions[name] for name in fits},
+        notes=(*capture.notes, *notes),
     )
-    capture = _named_by_expression(capture)
-    if NEUTRAL not in capture.expressions:
-        raise EstimationError(f"{source}: no photo in {NEUTRAL} shows a face that can be used")
-    capture, fits, units = _fit_all(capture, generic, options, tell)
-    head = _head(capture, fits, units, generic)
-    head, coverage = _with_textures(head, capture, options, tell)
+    head, coverage = texture_head(
+        _untextured_head(capture.name, neutral, expressions, known),
+        _photos(capture),
+        size=options.texture_size,
+        fill=options.fill,
+        progress=stage_progress(progress, "Extracting textures"),
+    )
     return Build(head, capture, fits, coverage)
 
 
@@ -143,42 +143,56 @@ def _check_neutral(source: Path) -> None:
         raise EstimationError(f"{source}: there is no folder called {NEUTRAL} among its folders")
 
 
-def _fit_all(
-    capture: Capture, generic: GenericHead, options: BuildOptions, tell: Progress
-) -> tuple[Capture, dict[str, Fit | ExpressionFit], Float[Array, "52 v 3"]]:
-    """Neutral by itself, then each expression with neutral and its face units as what is known;
+def _load_capture(source: str | Path, options: BuildOptions, progress: StepProgress) -> Capture:
+    capture = load_capture(
+        source,
+        face=options.face,
+        frames=options.frames,
+        expressions=options.expressions,
+        progress=progress,
+    )
+    if NEUTRAL not in capture.expressions:
+        raise EstimationError(f"{source}: no photo in {NEUTRAL} shows a face that can be used")
+    return _named_by_expression(capture)
 
-    gives the units, too.
 
-    An expression that cannot be fitted is left out of the capture, with a note.
-    """
-    count = len(capture.expressions)
+def _fit_neutral(
+    capture: Capture, generic: GenericHead, options: FitOptions, progress: StepProgress
+) -> tuple[NeutralFit, KnownHead]:
+    """The face at rest, its lips closed, and what the expressions are fitted with."""
+    progress(0, len(capture.expressions))
+    views = capture.expressions[NEUTRAL]
+    fit = fit_views(views, generic, options, progress=_part(0, capture, progress))
+    fit = replace(fit, vertices=close_lips(generic, fit.vertices))
+    views = tuple(view for view in views if view.photo.name in fit.photos)
+    cameras = [fit.photos[view.photo.name].camera for view in views]
+    units = fit_units(generic, fit.vertices)
+    return fit, KnownHead(views, cameras, fit.vertices, units.astype(np.float64), generic)
 
-    def part(number: int) -> StepProgress:
-        return lambda done, total: tell(SOLVING, number * total + done, count * total)
 
-    tell(SOLVING, 0, count)
-    neutral = fit_views(capture.expressions[NEUTRAL], generic, options.fit, progress=part(0))
-    neutral = replace(neutral, vertices=meet_lips(generic, neutral.vertices))
-    fits: dict[str, Fit | ExpressionFit] = {NEUTRAL: neutral}
-    views = [view for view in capture.expressions[NEUTRAL] if view.photo.name in neutral.photos]
-    cameras = [neutral.photos[view.photo.name].camera for view in views]
-    units = fit_units(generic, neutral.vertices)
-    known = KnownHead(views, cameras, neutral.vertices, units.astype(np.float64), generic)
-    contacts = Contacts.of(generic, neutral.vertices)
-    notes = []
-    for number, (name, shown) in enumerate(capture.expressions.items()):
+def _fit_expressions(
+    capture: Capture, known: KnownHead, progress: StepProgress
+) -> tuple[dict[str, ExpressionFit], list[str]]:
+    """Every expression but neutral; notes on those that cannot be fitted and are left out."""
+    contacts = Contacts.of(known.generic, known.vertices)
+    fits, notes = {}, []
+    for number, (name, views) in enumerate(capture.expressions.items()):
         if name == NEUTRAL:
             continue
         try:
-            fit = fit_expression(shown, known, progress=part(number))
+            fit = fit_expression(views, known, progress=_part(number, capture, progress))
         except EstimationError as error:
             notes.append(f"{name}: left out: {error}")
             continue
-        fits[name] = replace(fit, vertices=contacts.resolved(fit.vertices))
-    tell(SOLVING, count, count)
-    fitted = {name: capture.expressions[name] for name in fits}
-    return replace(capture, expressions=fitted, notes=(*capture.notes, *notes)), fits, units
+        fits[name] = replace(fit, vertices=contacts.resolve(fit.vertices))
+    progress(len(capture.expressions), len(capture.expressions))
+    return fits, notes
+
+
+def _part(number: int, capture: Capture, progress: StepProgress) -> StepProgress:
+    """Progress of one expression as progress of all."""
+    count = len(capture.expressions)
+    return lambda done, total: progress(number * total + done, count * total)
 
 
 def _named_by_expression(capture: Capture) -> Capture:
@@ -195,101 +209,45 @@ def _named_by_expression(capture: Capture) -> Capture:
     return replace(capture, expressions=expressions)
 
 
-def _head(
-    capture: Capture,
-    fits: Mapping[str, Fit | ExpressionFit],
-    units: Float[Array, "52 v 3"],
-    generic: GenericHead,
+def _untextured_head(
+    subject: str, neutral: NeutralFit, expressions: Mapping[str, ExpressionFit], known: KnownHead
 ) -> Head:
-    neutral = fits[NEUTRAL]
-    assert isinstance(neutral, Fit)
+    generic = known.generic
+    left_out = dict(neutral.left_out)
+    for fit in expressions.values():
+        left_out |= fit.left_out
     return Head(
-        subject=capture.name,
+        subject=subject,
         mesh=generic.mesh.with_vertices(neutral.vertices),
-        expressions={name: _expression(name, fit, generic) for name, fit in fits.items()},
+        expressions={
+            NEUTRAL: Expression(neutral.vertices, _fitted_views(neutral), ATLAS),
+            **{name: _expression(name, fit, generic) for name, fit in expressions.items()},
+        },
         uncertainty_mm=neutral.uncertainty_mm,
         unit_names=generic.unit_names,
-        unit_offsets=units,
+        unit_offsets=known.units,
         regions=default_masks(generic),
-        left_out={photo: why for fit in fits.values() for photo, why in fit.left_out.items()},
+        left_out=left_out,
     )
 
 
-def _expression(name: str, fit: Fit | ExpressionFit, generic: GenericHead) -> Expression:
-    views = tuple(
+def _expression(name: str, fit: ExpressionFit, generic: GenericHead) -> Expression:
+    weights = zip(generic.unit_names, fit.units.tolist(), strict=True)
+    units = {unit: weight for unit, weight in weights if weight > _NEGLIGIBLE}
+    vertices = with_turned_eyes(fit.vertices, fit.gaze, generic)
+    return Expression(vertices, _fitted_views(fit), name, units, fit.gaze)
+
+
+def _fitted_views(fit: Fit) -> tuple[FittedView, ...]:
+    return tuple(
         FittedView(
             photo=photo,
             camera=item.camera,
             rms_px=item.rms_px,
             points_used=item.points_used,
-            distrusted={mark.name: mark.verdict for mark in item.marks if mark.verdict},
+            distrusted={mark.name: mark.rejection for mark in item.marks if mark.rejection},
         )
         for photo, item in fit.photos.items()
-    )
-    if isinstance(fit, Fit):
-        return Expression(fit.vertices, views, ATLAS)
-    weights = zip(generic.unit_names, fit.units.tolist(), strict=True)
-    units = {unit: weight for unit, weight in weights if weight > _NEGLIGIBLE}
-    vertices = with_turned_eyes(fit.vertices, fit.gaze, generic)
-    return Expression(vertices, views, name, units, fit.gaze)
-
-
-def _with_textures(
-    head: Head, capture: Capture, options: BuildOptions, tell: Progress
-) -> tuple[Head, Float[Array, "h w"]]:
-    """The head with an atlas for every expression and neutral's cylinder, and
-
-    neutral's coverage.
-
-    Source:
-        [Pighin 2002] sec. 5.2.2.
-    """
-    stage, total, side = "Extracting textures", 3, options.texture_size
-    tell(stage, 0, total)
-    atlas = atlas_surface(head.mesh, width=side, height=side)
-    base = _extract(head, capture, NEUTRAL, atlas, options.fill)
-    tell(stage, 1, total)
-    photos = _photos(capture)
-    photographed = {
-        name: Photographed(
-            item.vertices,
-            [view.camera for view in item.views],
-            [photos[view.photo] for view in item.views],
-        )
-        for name, item in head.expressions.items()
-    }
-    looks = paint_expressions(head.mesh, photographed, base.pixels, load_generic_head())
-    tell(stage, 2, total)
-    around = cylinder_surface(head.mesh, fit_cylinder(head.mesh), parts=("skin",))
-    cylinder = _extract(head, capture, NEUTRAL, around, options.fill)
-    tell(stage, 3, total)
-    textures = {head.expressions[name].texture: pixels for name, pixels in looks.textures.items()}
-    textures[CYLINDER] = cylinder.pixels
-    gains = looks.gains | {NEUTRAL: base.gains}
-    expressions = {
-        name: replace(item, views=_with_gains(item.views, gains[name]))
-        for name, item in head.expressions.items()
-    }
-    head = replace(head, expressions=expressions, textures=textures, shading=looks.shading)
-    return head, base.coverage
-
-
-def _with_gains(views: Sequence[FittedView], gains: Float[Array, "k 3"]) -> tuple[FittedView, ...]:
-    return tuple(replace(view, gains=own) for view, own in zip(views, gains, strict=True))
-
-
-def _extract(head: Head, capture: Capture, name: str, surface: SurfaceMap, fill: Fill) -> Texture:
-    generic = load_generic_head()
-    photos = _photos(capture)
-    views = head.expressions[name].views
-    return extract_texture(
-        head.expression_mesh(name),
-        [view.camera for view in views],
-        [photos[view.photo] for view in views],
-        surface=surface,
-        fill=fill,
-        mirror=generic.mirror,
-        regions=generic.regions,
     )
 
 

@@ -17,7 +17,7 @@ from mien.assets.feature_points import FeatureLayout, load_feature_layout
 from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.faces.face_series import FaceSeries, find_faces, load_pictures, row_of, rows_of
 from mien.capture.images.photos import Photo, load_photo
-from mien.capture.notes import gathered_notes
+from mien.capture.notes import merge_notes
 from mien.capture.source_kind import SourceKind, kind_of_source
 from mien.io.examples.example_folder import (
     check_example_place,
@@ -194,8 +194,8 @@ def _gather(
             max_side=request.max_side,
             kind=kind,
             face=request.face,
-            look=measured,
-            report=partial(report, FINDING),
+            on_picture=measured,
+            progress=partial(report, FINDING),
         )
     overrides = request.overrides(series)
     annotated = _annotated_points(series, layout)
@@ -270,7 +270,7 @@ def _notes(
     """What was odd in the pictures, how many were what, and what was changed or is missing."""
     notes = [*series.notes]
     notes += [note for file in series.files for note in annotation_notes(file, layout)]
-    notes += gathered_notes(
+    notes += merge_notes(
         (series.names[row], f"{len(points)} points marked by hand")
         for row, points in annotated.items()
     )

@@ -11,7 +11,7 @@ from mien.assets.generic import load_generic_head
 from mien.camera import Camera
 from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.faces.landmarks import cut_note
-from mien.capture.images.photos import Photo, shrunk
+from mien.capture.images.photos import Photo, downscale
 from mien.errors import EstimationError
 from mien.head import Head
 from mien.pipelines.tracking.ready_head import ReadyHead
@@ -61,12 +61,12 @@ def find_head(head: Head, photo: Photo) -> HeadInPhoto:
     """
     width, height = photo.size
     focal = photo.focal_prior_px or expected_focal(head, width, height).focal_px
-    pixels = np.ascontiguousarray(shrunk(photo.pixels, _SIDE))
+    pixels = np.ascontiguousarray(downscale(photo.pixels, _SIDE))
     with LandmarkDetector() as detector:
         largest = detector.detect(photo)  # Fails before the slow preparation of the head.
         ready = ReadyHead(head, detector, TrackOptions())
         # The tracker finds upright faces only.
-        start = ready.starter.fit(largest.as_face(), size=photo.size, focal_px=focal)
+        start = ready.starter.fit(largest.as_detected_face(), size=photo.size, focal_px=focal)
         tracked = [
             ready.tracker(width, height, focal).step(pixels, 0, 0.0, initial)
             for initial in (None, start)

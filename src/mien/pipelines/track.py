@@ -113,12 +113,12 @@ def track_video(
     files.check(clip.path)
     if smooth_seconds is not None:
         check_positive("smooth_seconds", smooth_seconds)
-    facts = clip.facts()
+    facts = clip.info()
     focal_px = None if lens is None else parse_lens(lens, facts.width, facts.height)
     notes = [STARTED_OVER] if journal_of(files.table).exists() and not resume else []
     with LandmarkDetector() as detector:
         if turn_upright(clip, detector):
-            facts = clip.facts()
+            facts = clip.info()
             focal_px = None if lens is None else parse_lens(lens, facts.width, facts.height)
         ready = ReadyHead(head, detector, options or TrackOptions())
         if focal_px is None:

@@ -7,7 +7,7 @@ from itertools import islice
 
 from mien.arrays import Array, UInt8
 from mien.capture.video.frames_ahead import frames_ahead
-from mien.capture.video.video import Video, VideoFacts
+from mien.capture.video.video import Video, VideoInfo
 from mien.pipelines.tracking.ready_head import ReadyHead
 from mien.progress import Progress
 from mien.track.landmarks.focal import estimate_focal
@@ -19,7 +19,7 @@ _FIRST, _EVERY, _SIDE = 300, 5, 1280
 
 
 def find_focal(
-    clip: Video, facts: VideoFacts, ready: ReadyHead, tell: Progress
+    clip: Video, facts: VideoInfo, ready: ReadyHead, tell: Progress
 ) -> tuple[float, str]:
     """Focal length of a clip's pictures in px, from the first of them, and a note on it.
 

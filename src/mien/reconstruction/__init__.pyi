@@ -8,6 +8,8 @@ from mien.pipelines.build import Build as Build
 from mien.pipelines.build import BuildOptions as BuildOptions
 from mien.pipelines.build import build_head as build_head
 from mien.pipelines.build import build_head_folder as build_head_folder
-from mien.reconstruction.fit import Fit as Fit
 from mien.reconstruction.fit import fit_views as fit_views
 from mien.reconstruction.landmark_fit import FitOptions as FitOptions
+from mien.reconstruction.result import ExpressionFit as ExpressionFit
+from mien.reconstruction.result import Fit as Fit
+from mien.reconstruction.result import NeutralFit as NeutralFit

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from mien.reconstruction.features import gather_features
 from mien.reconstruction.landmark_fit import FitOptions, Solution, residuals_of, solve_by_features
 from mien.reconstruction.outliers import (
     HOPELESS_SIGMAS,
-    PhotoFit,
     depth_notes,
     find_misfit,
     judge_marks,
@@ -26,10 +25,11 @@ from mien.reconstruction.outliers import (
     view_spread,
 )
 from mien.reconstruction.registration import register_solution
+from mien.reconstruction.result import NeutralFit, PhotoFit
 from mien.reconstruction.shape.deformation import eye_centers
 from mien.reconstruction.shape.feature_guide import guide_features
 
-__all__ = ["Fit", "FitOptions", "fit_views"]
+__all__ = ["FitOptions", "NeutralFit", "fit_views"]
 
 ONE_SIDE_DEG = 10.0
 """Photos from within so much, as landmarks alone have it, tell no depth."""
@@ -38,32 +38,13 @@ NEARER_TELLS = 1.3
 """Unless one is taken from so many times the distance of another: perspective tells it, too."""
 
 
-@dataclass(frozen=True)
-class Fit:
-    """A fitted shape.
-
-    Attributes:
-        vertices: (V, 3) mm, head space.
-        photos: by photo name, those that fit.
-        left_out: why, by photo name, the others did not.
-        uncertainty_mm: (V,).
-        notes: what a user should know about this fit.
-    """
-
-    vertices: Float[Array, "v 3"]
-    photos: dict[str, PhotoFit]
-    left_out: dict[str, str]
-    uncertainty_mm: Float[Array, " v"]
-    notes: tuple[str, ...] = ()
-
-
 def fit_views(
     views: Sequence[CapturedView],
     generic: GenericHead,
     options: FitOptions,
     *,
     progress: StepProgress | None = None,
-) -> Fit:
+) -> NeutralFit:
     """Cameras and shape of one expression.
 
     Args:
@@ -88,7 +69,7 @@ def _fit_views(
     generic: GenericHead,
     options: FitOptions,
     progress: StepProgress | None,
-) -> Fit:
+) -> NeutralFit:
     marked = [view for view in views if view.marked]
     faceless = [view for view in views if not view.marked]
     if not marked:
@@ -119,7 +100,7 @@ def _fit_views(
         matches, rms_px = solution.matches[k] if solution.matches else (0, 0.0)
         photos[view.photo.name] = PhotoFit(camera, marks, matches, rms_px)
     notes = (*depth_notes(cameras), *solution.notes, *name_notes(photos))
-    return Fit(vertices, photos, left_out, solution.uncertainty_mm, notes)
+    return NeutralFit(vertices, photos, left_out, notes, uncertainty_mm=solution.uncertainty_mm)
 
 
 def _all_photos(

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from mien.arrays import Array, Float
 from mien.camera import Camera
 from mien.reconstruction.features import Features
+from mien.reconstruction.result import Mark, PhotoFit
 
 DISTRUST_SIGMAS = 5.0
 """A mark this many times its expected error off the model is distrusted."""
@@ -23,71 +23,17 @@ HOPELESS_SIGMAS = 12.0
 MIN_PARALLAX_DEG = 8.0
 
 
-@dataclass(frozen=True)
-class Mark:
-    """One feature in one photo: where it was seen and how far off the model puts it, px."""
-
-    name: str
-    image_point: Float[Array, " 2"]
-    residual_px: Float[Array, " 2"]
-    by_hand: bool
-    verdict: str = ""
-
-    @property
-    def distance_px(self) -> float:
-        """Length of the residual."""
-        return float(np.hypot(*self.residual_px))
-
-
-@dataclass(frozen=True)
-class PhotoFit:
-    """The camera of one photo and how well what it shows agrees with the fitted head.
-
-    Attributes:
-        marks: hand-made marks and landmarks.
-        matches: places of the skin that the other photos show, too; they outweigh landmarks.
-        matches_rms_px: root mean square of their residuals.
-    """
-
-    camera: Camera
-    marks: tuple[Mark, ...]
-    matches: int = 0
-    matches_rms_px: float = 0.0
-
-    @property
-    def trusted(self) -> tuple[Mark, ...]:
-        """The marks without a verdict."""
-        return tuple(mark for mark in self.marks if not mark.verdict)
-
-    @property
-    def points_used(self) -> int:
-        """How many points the camera and the shape rest on."""
-        return self.matches + len(self._leading)
-
-    @property
-    def _leading(self) -> tuple[Mark, ...]:
-        """Trusted marks that count beside the matches: where there are any, those made by hand."""
-        return tuple(mark for mark in self.trusted if mark.by_hand or not self.matches)
-
-    @property
-    def rms_px(self) -> float:
-        """Root mean square distance over the points used."""
-        total = self.matches * self.matches_rms_px**2
-        total += sum(mark.distance_px**2 for mark in self._leading)
-        return float(np.sqrt(total / self.points_used)) if self.points_used else 0.0
-
-
 def judge_marks(
     features: Features, k: int, residuals: Float[Array, "n 2"], sigma_px: Float[Array, " n"]
 ) -> tuple[Mark, ...]:
-    """Every mark of photo k with its residual; far off its expected error it gets a verdict."""
+    """Every mark of photo k with its residual; far off its expected error it gets a rejection."""
     marks = []
     for n in np.flatnonzero(features.seen[k]):
         off = float(np.hypot(*residuals[n])) / sigma_px[n]
-        verdict = f"{off:.0f} times its expected error off" if off > DISTRUST_SIGMAS else ""
+        rejection = f"{off:.0f} times its expected error off" if off > DISTRUST_SIGMAS else ""
         by_hand = bool(features.by_hand[k, n])
         place = features.image_points[k, n]
-        marks.append(Mark(features.names[n], place, residuals[n], by_hand, verdict))
+        marks.append(Mark(features.names[n], place, residuals[n], by_hand, rejection))
     return tuple(marks)
 
 
@@ -137,7 +83,7 @@ def name_notes(photos: Mapping[str, PhotoFit]) -> tuple[str, ...]:
     notes = []
     for photo, fit in photos.items():
         by_hand = [mark for mark in fit.marks if mark.by_hand]
-        distrusted = [mark for mark in by_hand if mark.verdict]
+        distrusted = [mark for mark in by_hand if mark.rejection]
         if len(distrusted) > ASKING_SHARE * len(by_hand):
             notes.append(
                 f"{photo}: {len(distrusted)} of its {len(by_hand)} hand-made marks are distrusted: "

@@ -12,9 +12,7 @@ from mien.arrays import Array, Float, UInt8
 from mien.camera import Camera
 from mien.head import Head
 from mien.progress import StepProgress, no_step_progress
-from mien.reconstruction.expression.fit import ExpressionFit
-from mien.reconstruction.fit import Fit
-from mien.reconstruction.outliers import Mark, PhotoFit
+from mien.reconstruction.result import Fit, Mark, PhotoFit
 from mien.reconstruction.shape.deformation import eye_centers
 from mien.report.expressions import count_expressions, expression_rows
 from mien.report.pictures import (
@@ -41,7 +39,7 @@ class ReportInput:
 
     head: Head
     photos: Mapping[str, UInt8[Array, "h w 3"]]
-    fits: Mapping[str, Fit | ExpressionFit]
+    fits: Mapping[str, Fit]
     coverage: Float[Array, "h w"]
     notes: tuple[str, ...] = ()
     turntable: str = ""
@@ -112,8 +110,8 @@ def _residual(mark: Mark) -> dict[str, Any]:
         "x": float(mark.image_point[0]),
         "y": float(mark.image_point[1]),
         "residual_px": mark.distance_px,
-        "trusted": not mark.verdict,
-        "verdict": mark.verdict or ("by hand" if mark.by_hand else "detected"),
+        "trusted": not mark.rejection,
+        "verdict": mark.rejection or ("by hand" if mark.by_hand else "detected"),
     }
 
 

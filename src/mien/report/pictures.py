@@ -10,7 +10,7 @@ from mien.arrays import Array, Float, UInt8
 from mien.head import ATLAS, Head
 from mien.io.files.image import encode_image
 from mien.mesh import Mesh
-from mien.reconstruction.outliers import PhotoFit
+from mien.reconstruction.result import PhotoFit
 from mien.render.orbit import orbit_camera
 from mien.render.overlay import overlay_mesh
 from mien.render.picture import GREY
@@ -61,7 +61,7 @@ def overlay_picture(mesh: Mesh, fit: PhotoFit, pixels: UInt8[Array, "h w 3"]) ->
     for mark in fit.marks:
         seen = mark.image_point * factor - 0.5
         model = seen + mark.residual_px * factor
-        colour = _DISTRUSTED if mark.verdict else _USED
+        colour = _DISTRUSTED if mark.rejection else _USED
         ends = [tuple(int(x) for x in np.rint(point * 16)) for point in (seen, model)]
         cv2.line(image, ends[0], ends[1], colour, 1, cv2.LINE_AA, 4)
         cv2.circle(image, ends[0], 32 if mark.by_hand else 20, colour, -1, cv2.LINE_AA, 4)

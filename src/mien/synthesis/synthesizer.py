@@ -173,7 +173,7 @@ class Synthesizer:
         _check_choice("head", head, HeadMotionMode)
         estimated = head == "estimated" and len(subset) >= MIN_MOTION_POINTS
         motion = estimate_planar_similarity(neutral[subset], given) if estimated else None
-        aligned = given if motion is None else motion.undo(given)
+        aligned = given if motion is None else motion.inverse(given)
         inferred = self._model(subset, estimated).infer(subset, aligned - neutral[subset])
         completed = neutral + inferred.displacements
         if motion is not None:

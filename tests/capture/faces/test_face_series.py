@@ -43,8 +43,8 @@ def test_a_folder_of_photos(folder: Path, detector: LandmarkDetector) -> None:
         folder,
         detector,
         max_side=200,
-        look=lambda pixels, landmarks: seen.append((*pixels.shape, *landmarks.shape)),
-        report=lambda done, total: told.append((done, total)),
+        on_picture=lambda pixels, landmarks: seen.append((*pixels.shape, *landmarks.shape)),
+        progress=lambda done, total: told.append((done, total)),
     )
     assert (series.is_video, series.names) == (False, ("left.png", "right.png"))
     assert list(series.left_out) == ["wall.png"]

@@ -10,7 +10,7 @@ from PIL import Image
 
 from filmed import coded_hdr, hdr_written
 from mien.arrays import Array
-from mien.capture.images.hdr import HLG, KNEE, PQ, WHITE, to_srgb
+from mien.capture.images.hdr import HLG, KNEE, PQ, WHITE, hdr_to_srgb
 from mien.capture.images.photos import load_photo
 from mien.capture.video.video import Video
 
@@ -20,7 +20,7 @@ SKIN = np.array([[236, 188, 160], [198, 134, 100], [141, 85, 54], [80, 45, 30]],
 
 def through(codes: Array, transfer: int) -> Array:
     signal = np.rint(65535 * coded_hdr(codes, transfer)).astype(np.uint16)
-    return to_srgb(signal, transfer, BT2020).astype(float)
+    return hdr_to_srgb(signal, transfer, BT2020).astype(float)
 
 
 @pytest.mark.parametrize("transfer", [HLG, PQ])
@@ -53,7 +53,7 @@ def test_bright_colours_keep_their_hue() -> None:
 
 def test_primaries_of_ordinary_video_stay() -> None:
     half = np.full((1, 1, 3), 0.5) * [1, 0, 0]
-    red = to_srgb(np.rint(65535 * half).astype(np.uint16), PQ, BT709)[0, 0]
+    red = hdr_to_srgb(np.rint(65535 * half).astype(np.uint16), PQ, BT709)[0, 0]
     assert red[0] > 0
     assert not red[1:].any()
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mien.capture.images.opening import FORMATS, opened_image
+from mien.capture.images.opening import FORMATS, open_image
 from mien.capture.images.photos import load_photo
 from mien.capture.video.video import Video
 from mien.errors import FileFormatError, InputError
@@ -48,7 +48,7 @@ def test_the_handed_postscript(shared: Path) -> None:
 
 def test_every_kind_that_is_read_is_known_to_pillow(tmp_path: Path) -> None:
     Image.new("L", (2, 2)).save(tmp_path / "a.png")
-    with opened_image(tmp_path / "a.png", []):
+    with open_image(tmp_path / "a.png", []):
         assert set(FORMATS) <= set(Image.OPEN)
 
 
@@ -60,7 +60,7 @@ def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match=r"a\.jpg: expected an image, found a named pipe"):
         load_image(tmp_path / "a.jpg")
     with pytest.raises(InputError, match=r"a\.jpg: expected a video, got a named pipe"):
-        Video(tmp_path / "a.jpg").facts()
+        Video(tmp_path / "a.jpg").info()
 
 
 @pytest.mark.skipif(not hasattr(socket, "AF_UNIX"), reason="no sockets among files here")

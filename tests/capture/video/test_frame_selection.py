@@ -43,7 +43,7 @@ def test_another_expression_is_never_taken() -> None:
 
 def test_an_open_mouth_is_not_at_rest_even_where_it_is_what_the_clip_shows_most() -> None:
     talking = [0.12, 0.15, 0.1, 0.12, 0.0, 0.0]
-    scores = clip([0, 10, 20, -20, 5, 30], lips_apart=talking)
+    scores = clip([0, 10, 20, -20, 5, 30], lip_gap=talking)
     assert choose_frames(scores, 7).tolist() == [4, 5]
 
 

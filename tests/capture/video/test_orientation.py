@@ -41,7 +41,7 @@ def test_turned_until_the_head_is_upright(
     video = Video(lying(tmp_path / "a.mp4", face, quarters))
     assert turn_upright(video, detector) == bool(quarters)
     assert video.notes == NOTES[quarters]
-    assert (video.facts().width, video.facts().height) == (300, 400)
+    assert (video.info().width, video.info().height) == (300, 400)
     frame = next(video.frames())
     assert np.abs(frame.pixels().astype(int) - face).mean() < 4
     assert frame.size == (300, 400)

@@ -56,7 +56,7 @@ class Audience:
     def detect(self, photo: Photo, *, face: int | None = None) -> Landmarks:
         raise NoFaceError(photo.name)
 
-    def all_fast(self, pixels: Array) -> list[DetectedFace]:
+    def detect_all_fast(self, pixels: Array) -> list[DetectedFace]:
         level = 40 * round(pixels.mean() / 40)
         if level not in PLAYED:
             return []

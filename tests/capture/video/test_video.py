@@ -12,7 +12,7 @@ from PIL import Image
 
 from filmed import broken, flagged, grey, shown_by, written
 from mien.arrays import Array
-from mien.capture.video.video import Video, VideoFacts
+from mien.capture.video.video import Video, VideoInfo
 from mien.errors import FileFormatError, InputError
 
 
@@ -30,7 +30,7 @@ def test_frames_come_in_order_with_their_times(tmp_path: Path) -> None:
 @pytest.mark.parametrize("suffix", ["mp4", "mkv"])
 def test_what_a_file_states(tmp_path: Path, suffix: str) -> None:
     video = Video(written(tmp_path / f"a.{suffix}", grey([20, 60, 100, 140])))
-    assert video.facts() == VideoFacts(64, 48, fps=10, frames=4, seconds=0.4)
+    assert video.info() == VideoInfo(64, 48, fps=10, frames=4, seconds=0.4)
 
 
 def test_times_count_from_the_beginning(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_rotation_flag(tmp_path: Path, quarters: int) -> None:
         pixels = frame.pixels(max_side=max_side)
         assert pixels.shape == expected[::step, ::step].shape
         assert np.median(np.abs(pixels - expected[::step, ::step])) <= 4
-    facts = video.facts()
+    facts = video.info()
     assert (facts.height, facts.width) == expected.shape[:2]
 
 
@@ -110,7 +110,7 @@ def test_a_matrix_that_mirrors(
         pixels = frame.pixels(max_side=max_side)
         assert pixels.shape == expected[::step, ::step].shape
         assert np.median(np.abs(pixels - expected[::step, ::step])) <= 4
-    facts = video.facts()
+    facts = video.info()
     assert (facts.height, facts.width) == expected.shape[:2]
 
 
@@ -149,7 +149,7 @@ def test_the_cover_of_a_song_is_no_video(tmp_path: Path) -> None:
         container.mux(cover.encode(av.VideoFrame(16, 16, "rgb24")))
         container.mux(cover.encode())
     with pytest.raises(FileFormatError, match="expected a video, found no picture track"):
-        Video(tmp_path / "a.m4a").facts()
+        Video(tmp_path / "a.m4a").info()
 
 
 def test_broken_half_way_keeps_what_was_decoded(tmp_path: Path, rng: np.random.Generator) -> None:

@@ -64,23 +64,23 @@ def camera() -> Iterator[Camera]:
     camera.deliver(None)
 
 
-def opened(camera: Camera) -> Webcam:
-    return Webcam(0, opened=lambda number: camera, clock=Ticks(), patience=30.0)
+def open_device(camera: Camera) -> Webcam:
+    return Webcam(0, open_device=lambda number: camera, clock=Ticks(), timeout_s=30.0)
 
 
 def test_what_is_known_before(camera: Camera) -> None:
-    webcam = opened(camera)
+    webcam = open_device(camera)
     assert (webcam.width, webcam.height, webcam.fps) == (64, 48, 25.0)
 
 
 @pytest.mark.parametrize("stated", [0.0, -1.0, float("nan"), 180000.0])
 def test_a_rate_that_is_none(camera: Camera, stated: float) -> None:
     camera.fps = stated
-    assert opened(camera).fps == 30.0
+    assert open_device(camera).fps == 30.0
 
 
 def test_the_newest_picture_comes_first(camera: Camera) -> None:
-    webcam = opened(camera)
+    webcam = open_device(camera)
     camera.deliver(10)
     camera.settle(3)
     frames = webcam.frames()
@@ -96,7 +96,7 @@ def test_the_newest_picture_comes_first(camera: Camera) -> None:
 
 
 def test_a_reader_that_is_fast_enough_waits_for_every_picture(camera: Camera) -> None:
-    webcam = opened(camera)
+    webcam = open_device(camera)
     frames = webcam.frames()
     seen = [next(frames).index]
     for level in (20, 30, 40):
@@ -106,14 +106,14 @@ def test_a_reader_that_is_fast_enough_waits_for_every_picture(camera: Camera) ->
 
 
 def test_pixels_are_rgb_and_may_be_reduced(camera: Camera) -> None:
-    frame = next(opened(camera).frames())
+    frame = next(open_device(camera).frames())
     assert frame.pixels()[0, 0].tolist() == [1, 1, 7]
     assert frame.pixels(max_side=32).shape == (24, 32, 3)
     assert frame.pixels(max_side=640).shape == (48, 64, 3)
 
 
 def test_a_camera_that_is_pulled_out_ends_with_a_note(camera: Camera) -> None:
-    webcam = opened(camera)
+    webcam = open_device(camera)
     frames = webcam.frames()
     next(frames)
     camera.deliver(10)
@@ -126,14 +126,14 @@ def test_a_camera_that_is_pulled_out_ends_with_a_note(camera: Camera) -> None:
 
 
 def test_a_camera_that_hangs_ends_with_a_note(camera: Camera) -> None:
-    webcam = opened(camera)
+    webcam = open_device(camera)
     webcam._patience = 0.01
     assert len(list(webcam.frames())) == 1
     assert webcam.notes == ["camera 0 stopped delivering after 1 pictures"]
 
 
 def test_close_lets_go_of_the_camera(camera: Camera) -> None:
-    webcam = opened(camera)
+    webcam = open_device(camera)
     webcam._patience = 0.01
     webcam.close()
     camera.deliver(10)
@@ -147,7 +147,7 @@ def test_a_camera_without_pictures() -> None:
     dead.deliver(None)
     expected = "camera 0: expected a camera that delivers pictures, got one that does not"
     with pytest.raises(InputError, match=expected):
-        opened(dead)
+        open_device(dead)
     assert dead.released
 
 

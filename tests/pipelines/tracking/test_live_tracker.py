@@ -43,7 +43,7 @@ class Clock:
 
 
 @dataclass
-class Shot:
+class UnconvertedPicture:
     level: int
 
     def pixels(self, *, max_side: int | None = None) -> Array:
@@ -72,7 +72,7 @@ class Source:
                     continue
                 taken = 100 + index / 25
                 self.clock.now = max(self.clock.now, taken)
-                yield LiveFrame(index, index / 25, taken, Shot(10 * index))
+                yield LiveFrame(index, index / 25, taken, UnconvertedPicture(10 * index))
             self.notes.append("that was all")
         finally:
             self.closed = True

@@ -35,12 +35,12 @@ from mien.numeric.rotation import angle_between
 from mien.reconstruction.expression.fit import (
     SAME_LENS_SD,
     STRANGE_SKIN,
-    ExpressionFit,
     _expected_units,
     _lenses,
     fit_expression,
 )
 from mien.reconstruction.landmark_fit import FOCAL_PRIOR_DEVIATION
+from mien.reconstruction.result import ExpressionFit
 
 WEIGHTS = weights_of(mouthSmile=0.7, browInnerUp=0.6, jawOpen=0.3)
 RESIDUAL = sum(
@@ -121,7 +121,7 @@ def test_marks_tell_where_the_fit_puts_them() -> None:
     item = fit.photos["0.png"]
     assert not fit.left_out
     assert len(item.marks) > 300
-    assert all(not mark.verdict for mark in item.marks)
+    assert all(not mark.rejection for mark in item.marks)
     assert np.median([mark.distance_px for mark in item.marks]) < 0.5
 
 

@@ -161,7 +161,7 @@ def test_the_picture_moves_with_the_head(layout, motion):
     example_set = examples_of(layout, [rounded(painted(centres()))])
     points = motion(example_set.neutral.points)
     image = Composer(example_set).render(points, same_everywhere(example_set, [1]), motion=motion)
-    back = motion.undo(centres())
+    back = motion.inverse(centres())
     seen = ((back > 1) & (back < [WIDTH - 1, HEIGHT - 1])).all(2)
     assert seen.mean() > 0.7
     assert np.abs(image[seen] - painted(back)[seen]).max() < 2.5

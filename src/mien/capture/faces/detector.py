@@ -1,4 +1,4 @@
-"""Finds the face in a photo: small, turned on its side, or one of several."""
+"""Detection of the face in a photo: small, turned on its side, or one of several."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mien.arrays import Array, UInt8
 from mien.assets.detector import detector_model_path
 from mien.capture.faces.landmarks import Landmarks, cut_note, facing_confidence, inside_picture
 from mien.capture.faces.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace, FaceNetwork
-from mien.capture.images.photos import Photo, shrunk
+from mien.capture.images.photos import Photo, downscale
 from mien.errors import EstimationError, InputError
 
 MIN_EYE_DISTANCE_PX = 20.0
@@ -22,7 +22,7 @@ GOOD_EYE_DISTANCE_PX = 60.0
 """From here on they are good to 1 % of it; more pixels add little."""
 
 SMALL_FACE = 0.15
-"""A face narrower than this share of a frame's longer side is looked at again from near by."""
+"""A face narrower than this part of a frame's longer side is detected again in a crop."""
 
 NO_FACE_FOUND = (
     "no face found; one must look within about 50 degrees of the camera and fill a twentieth of "
@@ -32,12 +32,12 @@ NO_FACE_FOUND = (
 _SEARCH_SIDE = 1280
 _CROP_WIDTHS = 1.5
 _CROP_SIDE = 768
-_STEADY = 0.02
+_MAX_SHIFT = 0.02
 _QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 class NoFaceError(EstimationError):
-    """A photo in which no face is found: there is none, or it looks past the detector's reach."""
+    """A photo in which no face is found: there is none, or it is turned too far away."""
 
 
 class LandmarkDetector:
@@ -68,36 +68,37 @@ class LandmarkDetector:
     def detect(self, photo: Photo, *, face: int | None = None) -> Landmarks:
         """The landmarks of the largest face, or of the one asked for.
 
-        The network sees a reduced photo first and then the face alone at good resolution: for a
-        face under a tenth of the photo's width that is the difference between 12 % and 0.5 % of
-        the distance between the eyes; for larger ones it changes nothing. The shift between both
-        passes tells a face from a mistaken one, as do photos that lie on their side.
+        The network gets a reduced photo first and then a crop of the face at good resolution: for a
+        face under a tenth of the photo's width this takes the error from 12 % to 0.5 % of the
+        distance between the eyes; for larger ones it changes nothing. A large shift between the
+        two passes reveals a false detection, as in photos that lie on their side.
 
         Args:
-            photo: upright as far as its file tells.
+            photo: upright as far as its file says.
             face: which one, counted from 1 from left to right in the photo.
 
         Raises:
             InputError: `face` is not positive, or there are fewer faces.
-            NoFaceError: no face. EstimationError: one too small.
+            NoFaceError: no face.
+            EstimationError: one too small.
         """
         if face is not None and face < 1:
             raise InputError("face", "a number from 1 on", face)
-        sight = self._best_sight(photo, face)
-        if sight is None:
+        detection = self._best_detection(photo, face)
+        if detection is None:
             raise NoFaceError(f"{photo.name}: {NO_FACE_FOUND}")
-        return _landmarks(photo, sight)
+        return _landmarks(photo, detection)
 
     def detect_fast(self, pixels: UInt8[Array, "h w 3"]) -> DetectedFace | None:
         """The largest face after a single pass, upright only: for the frames of a video."""
-        return next(iter(self.all_fast(pixels)), None)
+        return next(iter(self.detect_all_fast(pixels)), None)
 
-    def all_fast(self, pixels: UInt8[Array, "h w 3"]) -> list[DetectedFace]:
+    def detect_all_fast(self, pixels: UInt8[Array, "h w 3"]) -> list[DetectedFace]:
         """Every face, the largest first, after a single pass, upright only."""
         return sorted(self._network.faces(pixels), key=lambda found: -found.width)
 
-    def all_in_parts(self, pixels: UInt8[Array, "h w 3"]) -> list[DetectedFace]:
-        """Upright faces too small to be seen in the whole: in nine overlapping halves."""
+    def detect_in_tiles(self, pixels: UInt8[Array, "h w 3"]) -> list[DetectedFace]:
+        """Upright faces too small to be found in the whole picture: in nine overlapping tiles."""
         height, width = pixels.shape[:2]
         faces: list[DetectedFace] = []
         if min(height, width) < 2:
@@ -105,98 +106,98 @@ class LandmarkDetector:
         for top in (0, height // 4, height // 2):
             for left in (0, width // 4, width // 2):
                 part = pixels[top : top + height // 2, left : left + width // 2]
-                small = shrunk(part, _SEARCH_SIDE // 2)
+                small = downscale(part, _SEARCH_SIDE // 2)
                 factor = part.shape[1] / small.shape[1]
                 for found in self._network.faces(small):
-                    moved = _moved(found, factor, (left, top))
-                    if not any(same_place(moved, other) for other in faces):
+                    moved = _shifted(found, factor, (left, top))
+                    if not any(is_same_face(moved, other) for other in faces):
                         faces.append(moved)
         return faces
 
-    def _best_sight(self, photo: Photo, face: int | None) -> _Sight | None:
-        """The photo as it stands, in parts, then turned, until a face holds still."""
-        upright = self._look(photo, face)
-        upright = upright or self._refine(photo, self.all_in_parts(photo.pixels), face, 0)
-        if upright is not None and upright.steady:
+    def _best_detection(self, photo: Photo, face: int | None) -> _Detection | None:
+        """In the photo as it stands, in tiles, then turned, until both passes agree on a face."""
+        upright = self._detect_at(photo, face)
+        upright = upright or self._refine(photo, self.detect_in_tiles(photo.pixels), face, 0)
+        if upright is not None and upright.is_consistent:
             return upright
-        turned: list[_Sight | None] = []
+        turned: list[_Detection | None] = []
         for quarters in (1, 3, 2):
             try:
-                turned.append(self._look(photo, face, quarters))
+                turned.append(self._detect_at(photo, face, quarters))
             except InputError:
-                # That this copy shows fewer faces matters only where nothing else is found.
+                # Fewer faces in a turned copy matter only where nothing else is found.
                 if upright is None and quarters == 2 and not any(turned):
                     raise
-        best = min(filter(None, turned), key=lambda sight: sight.shift, default=None)
+        best = min(filter(None, turned), key=lambda detection: detection.shift, default=None)
         if best is None or (upright is not None and best.shift > upright.shift / 2):
             return upright
         return best
 
-    def _look(self, photo: Photo, face: int | None, quarters: int = 0) -> _Sight | None:
+    def _detect_at(self, photo: Photo, face: int | None, quarters: int = 0) -> _Detection | None:
         """The face in the photo turned by quarters counterclockwise, in the photo's own pixels."""
         pixels = np.rot90(photo.pixels, quarters)
-        small = shrunk(pixels, _SEARCH_SIDE)
+        small = downscale(pixels, _SEARCH_SIDE)
         faces = self._network.faces(small)
         factor = pixels.shape[1] / small.shape[1]
-        return self._refine(photo, [_moved(found, factor) for found in faces], face, quarters)
+        return self._refine(photo, [_shifted(found, factor) for found in faces], face, quarters)
 
     def _refine(
         self, photo: Photo, faces: list[DetectedFace], face: int | None, quarters: int
-    ) -> _Sight | None:
-        """The chosen face seen again from near by."""
+    ) -> _Detection | None:
+        """The chosen face, detected again in a crop around it."""
         if not faces:
             return None
         pixels = np.rot90(photo.pixels, quarters)
         size = pixels.shape[1], pixels.shape[0]
-        standing = [_turned_back(found, quarters, size) for found in faces]
-        number, notes = _choose(standing, face, photo.name)
-        near = _from_near_by(self, pixels, faces[number], _CROP_SIDE)
+        upright_faces = [_rotated_back(found, quarters, size) for found in faces]
+        number, notes = _select_face(upright_faces, face, photo.name)
+        near = _detect_in_crop(self, pixels, faces[number], _CROP_SIDE)
         if near is None:
-            return _Sight(standing[number], np.inf, quarters, notes)
+            return _Detection(upright_faces[number], np.inf, quarters, notes)
         offsets = np.linalg.norm((near.points - faces[number].points)[:, :2], axis=1)
         shift = float(np.median(offsets)) / _eye_distance(near)
-        return _Sight(_turned_back(near, quarters, size), shift, quarters, notes)
+        return _Detection(_rotated_back(near, quarters, size), shift, quarters, notes)
 
 
-def closer(
+def refine_small_face(
     detector: LandmarkDetector, pixels: UInt8[Array, "h w 3"], found: DetectedFace
 ) -> DetectedFace:
-    """A face found in a frame; one that is small is looked at again from near by."""
+    """The face found in a frame; a small one is detected again in a crop around it."""
     if found.width > SMALL_FACE * max(pixels.shape[:2]):
         return found
-    return _from_near_by(detector, pixels, found) or found
+    return _detect_in_crop(detector, pixels, found) or found
 
 
-def faces_around(
+def detect_around(
     detector: LandmarkDetector,
     pixels: UInt8[Array, "h w 3"],
-    place: tuple[float, float],
-    reach: float,
+    centre: tuple[float, float],
+    radius: float,
 ) -> list[DetectedFace]:
-    """Upright faces in the square cut-out that reaches so many px to each side of a place."""
-    left, top = (max(int(middle - reach), 0) for middle in place)
-    right, bottom = (max(int(middle + reach), 0) for middle in place)
+    """Upright faces in a square crop that reaches `radius` px to each side of a centre."""
+    left, top = (max(int(middle - radius), 0) for middle in centre)
+    right, bottom = (max(int(middle + radius), 0) for middle in centre)
     crop = np.ascontiguousarray(pixels[top:bottom, left:right])
     if min(crop.shape[:2]) < 2:
         return []
-    return [_moved(face, 1.0, (left, top)) for face in detector.all_fast(crop)]
+    return [_shifted(face, 1.0, (left, top)) for face in detector.detect_all_fast(crop)]
 
 
-def _from_near_by(
+def _detect_in_crop(
     detector: LandmarkDetector, pixels: Array, found: DetectedFace, side: int | None = None
 ) -> DetectedFace | None:
-    """The same face in a cut-out around it, reduced to so many px where they are given."""
-    crop, left, top = _around(pixels, found)
-    small = np.ascontiguousarray(crop if side is None else shrunk(crop, side))
+    """The same face in a crop around it, reduced to `side` px where that is given."""
+    crop, left, top = _crop_around(pixels, found)
+    small = np.ascontiguousarray(crop if side is None else downscale(crop, side))
     factor = crop.shape[1] / small.shape[1]
-    seen = [_moved(face, factor, (left, top)) for face in detector.all_fast(small)]
-    # Somebody else may be larger in the cut-out.
-    near = [face for face in seen if same_place(face, found)]
-    return min(near, key=lambda face: _apart(face, found), default=None)
+    in_crop = [_shifted(face, factor, (left, top)) for face in detector.detect_all_fast(small)]
+    # Somebody else may be larger in the crop.
+    near = [face for face in in_crop if is_same_face(face, found)]
+    return min(near, key=lambda face: _centre_distance(face, found), default=None)
 
 
 @dataclass(frozen=True)
-class _Sight:
+class _Detection:
     """A face as found in a photo that was turned for it.
 
     Attributes:
@@ -210,19 +211,19 @@ class _Sight:
     notes: tuple[str, ...]
 
     @property
-    def steady(self) -> bool:
+    def is_consistent(self) -> bool:
         """Both passes agree and the head is within 60 degrees of upright."""
         up_in_image = -self.face.R_cam_head[1, 1]
-        return self.shift < _STEADY and bool(up_in_image > 0.5)
+        return self.shift < _MAX_SHIFT and bool(up_in_image > 0.5)
 
 
-def _landmarks(photo: Photo, sight: _Sight) -> Landmarks:
-    points = sight.face.points[:, :2]
-    notes = [*sight.notes, *cut_note(points, photo.size)]
-    if sight.quarters:
-        degrees = {1: 90, 2: 180, 3: -90}[sight.quarters]
+def _landmarks(photo: Photo, detection: _Detection) -> Landmarks:
+    points = detection.face.points[:, :2]
+    notes = [*detection.notes, *cut_note(points, photo.size)]
+    if detection.quarters:
+        degrees = {1: 90, 2: 180, 3: -90}[detection.quarters]
         notes.append(f"the face was found after turning the photo by {degrees} degrees")
-    distance = _eye_distance(sight.face)
+    distance = _eye_distance(detection.face)
     if distance < MIN_EYE_DISTANCE_PX:
         raise EstimationError(
             f"{photo.name}: the face is too small, {distance:.0f} px between the eyes; "
@@ -233,18 +234,20 @@ def _landmarks(photo: Photo, sight: _Sight) -> Landmarks:
             f"the face is small, {distance:.0f} px between the eyes: expect "
             f"rough landmarks and texture; {GOOD_EYE_DISTANCE_PX:.0f} are advised"
         )
-    facing = facing_confidence(sight.face.points, sight.face.R_cam_head)
+    facing = facing_confidence(detection.face.points, detection.face.R_cam_head)
     return Landmarks(
         points,
         facing * inside_picture(points, photo.size),
-        sight.face.blendshapes,
-        sight.face.R_cam_head,
+        detection.face.blendshapes,
+        detection.face.R_cam_head,
         tuple(notes),
     )
 
 
-def _choose(faces: list[DetectedFace], face: int | None, name: str) -> tuple[int, tuple[str, ...]]:
-    """Which is the largest, or number `face` from the left; a note when there was a choice."""
+def _select_face(
+    faces: list[DetectedFace], face: int | None, name: str
+) -> tuple[int, tuple[str, ...]]:
+    """The index of the largest, or of number `face` from the left; a note if there are several."""
     ordered = sorted(range(len(faces)), key=lambda i: float(faces[i].points[:, 0].mean()))
     if face is not None:
         if face > len(ordered):
@@ -258,28 +261,28 @@ def _choose(faces: list[DetectedFace], face: int | None, name: str) -> tuple[int
     return largest, (note,)
 
 
-def same_place(one: DetectedFace, other: DetectedFace) -> bool:
-    """Whether two sights are of one face."""
-    return _apart(one, other) < max(one.width, other.width) / 2
+def is_same_face(one: DetectedFace, other: DetectedFace) -> bool:
+    """Whether two detections are of one face."""
+    return _centre_distance(one, other) < max(one.width, other.width) / 2
 
 
-def _apart(one: DetectedFace, other: DetectedFace) -> float:
-    """Px between the middles of two faces."""
+def _centre_distance(one: DetectedFace, other: DetectedFace) -> float:
+    """Px between the centroids of two faces."""
     return float(np.linalg.norm((one.points - other.points).mean(axis=0)[:2]))
 
 
 def _eye_distance(face: DetectedFace) -> float:
-    """Px between the irises, in depth too, so that a turned head does not seem smaller."""
+    """Px between the irises in 3D, so that a turned head does not seem smaller."""
     return float(np.linalg.norm(face.points[LEFT_IRIS] - face.points[RIGHT_IRIS]))
 
 
-def _moved(face: DetectedFace, factor: float, offset: tuple[int, int] = (0, 0)) -> DetectedFace:
+def _shifted(face: DetectedFace, factor: float, offset: tuple[int, int] = (0, 0)) -> DetectedFace:
     """The face in the pixels of the picture that this one was cut from and scaled."""
     return replace(face, points=face.points * factor + np.array([*offset, 0.0]))
 
 
-def _around(pixels: Array, face: DetectedFace) -> tuple[Array, int, int]:
-    """A square cut-out around the face, as far as the photo reaches, and its left and top."""
+def _crop_around(pixels: Array, face: DetectedFace) -> tuple[Array, int, int]:
+    """A square crop around the face, as far as the photo reaches, and its left and top."""
     low, high = face.points[:, :2].min(axis=0), face.points[:, :2].max(axis=0)
     half = _CROP_WIDTHS * face.width / 2
     left, top = np.maximum((low + high) / 2 - half, 0).astype(int)
@@ -287,7 +290,7 @@ def _around(pixels: Array, face: DetectedFace) -> tuple[Array, int, int]:
     return pixels[top:bottom, left:right], int(left), int(top)
 
 
-def _turned_back(face: DetectedFace, quarters: int, size: tuple[int, int]) -> DetectedFace:
+def _rotated_back(face: DetectedFace, quarters: int, size: tuple[int, int]) -> DetectedFace:
     """From a photo that was turned by quarters, then of this size, to the photo as it stands."""
     points, rotation = face.points, face.R_cam_head
     width, height = size

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8
-from mien.capture.faces.detector import LandmarkDetector, closer
+from mien.capture.faces.detector import LandmarkDetector, refine_small_face
 from mien.capture.faces.mediapipe_face import DetectedFace
 from mien.capture.faces.sharpness import face_sharpness
 from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
 from mien.capture.images.photos import Photo, load_photo
-from mien.capture.notes import gathered_notes
+from mien.capture.notes import merge_notes
 from mien.capture.source_kind import SourceKind, kind_of_source
 from mien.capture.video.clip_notes import ClipNotes
 from mien.capture.video.frame_photos import fetch_frames, frame_name
@@ -30,7 +30,7 @@ from mien.reading.names import portable_name
 __all__ = ["FaceSeries", "PictureCallback", "find_faces", "load_pictures", "row_of", "rows_of"]
 
 PictureCallback = Callable[[UInt8[Array, "h w 3"], Float[Array, "478 2"]], None]
-"""Told of each picture that shows a face, in the series' order, and where its landmarks are."""
+"""Called with the pixels and landmarks of each picture that shows a face, in the series' order."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class FaceSeries:
         max_side: px; larger pictures are reduced to it.
         quarters: turns counterclockwise of a video's frames, beyond what its file says.
         left_out: why, by name, of the pictures in which no face can be used.
-        notes: what was odd.
+        notes: what was clip_notes.
     """
 
     source: Path
@@ -78,42 +78,45 @@ def find_faces(
     max_side: int,
     kind: SourceKind | None = None,
     face: int | None = None,
-    look: PictureCallback | None = None,
-    report: StepProgress | None = None,
+    on_picture: PictureCallback | None = None,
+    progress: StepProgress | None = None,
 ) -> FaceSeries:
     """The face in every photo of a folder or in every frame of a video.
 
     Args:
+        source: a video, a folder or a photo.
+        detector: finds the faces.
         max_side: px; larger pictures are reduced to it.
         kind: of the source, if it is known already.
         face: as for LandmarkDetector.detect, of photos; a video's is the largest.
-        look: called with each picture that shows the face, as long as its pixels are there.
+        on_picture: called with each picture that shows the face, while its pixels are in memory.
+        progress: called after every picture.
 
     Raises:
-        InputError: no such source, damaged, not a video, no photo in it; a `face` of a video.
-        FileFormatError: as InputError.
+        InputError: no such source, no photo in it; a `face` of a video.
+        FileFormatError: a damaged picture or video.
         EstimationError: no picture shows a face.
     """
     kind, source = kind or kind_of_source(source), Path(source)
-    gathered = _Gathered(source, max_side, look or (lambda pixels, landmarks: None))
+    builder = _SeriesBuilder(source, max_side, on_picture or (lambda pixels, landmarks: None))
     if kind == "video":
         if face is not None:
             raise InputError("--face", "photos to choose a face in", f"a video, {source.name}")
-        gathered.read_video(detector, report)
+        builder.read_video(detector, progress)
     else:
-        gathered.read_photos(detector, face, report)
-    return gathered.series()
+        builder.read_photos(detector, face, progress)
+    return builder.series()
 
 
 def load_pictures(
-    series: FaceSeries, rows: Collection[int], report: StepProgress | None = None
+    series: FaceSeries, rows: Collection[int], progress: StepProgress | None = None
 ) -> Iterator[tuple[int, Photo]]:
     """The pictures of some rows of a series with the rows, in the series' order."""
     if not series.is_video:
         for number, row in enumerate(sorted(rows)):
             yield row, load_photo(series.files[row], max_side=series.max_side)
-            if report is not None:
-                report(number + 1, len(rows))
+            if progress is not None:
+                progress(number + 1, len(rows))
         return
     by_frame = {int(series.scores.index[row]): row for row in rows}
     last = max(by_frame, default=0)
@@ -121,16 +124,16 @@ def load_pictures(
         Video(series.source, series.quarters),
         by_frame,
         series.max_side,
-        lambda frame: None if report is None else report(frame + 1, last + 1),
+        lambda frame: None if progress is None else progress(frame + 1, last + 1),
     ):
         yield by_frame[index], photo
 
 
-class _Gathered:
-    """What was found so far."""
+class _SeriesBuilder:
+    """The pictures and faces found so far."""
 
-    def __init__(self, source: Path, max_side: int, look: PictureCallback) -> None:
-        self.source, self.max_side, self.look = source, max_side, look
+    def __init__(self, source: Path, max_side: int, on_picture: PictureCallback) -> None:
+        self.source, self.max_side, self.on_picture = source, max_side, on_picture
         self.is_video = False
         self.files: list[Path] = []
         self.names: list[str] = []
@@ -139,35 +142,35 @@ class _Gathered:
         self.rows: list[tuple[int, float, DetectedFace]] = []
         self.left_out: dict[str, str] = {}
         self.notes: list[str] = []
-        self.told: list[tuple[str, str]] = []
+        self.picture_notes: list[tuple[str, str]] = []
         self.quarters = 0
 
-    def read_video(self, detector: LandmarkDetector, report: StepProgress | None) -> None:
-        """Every frame, looked at once."""
+    def read_video(self, detector: LandmarkDetector, progress: StepProgress | None) -> None:
+        """Every frame, in one pass."""
         self.is_video = True
         video = Video(self.source)
         turn_upright(video, detector)
         self.quarters = video.quarters
-        total, odd = video.facts().frames, ClipNotes()
+        total, clip_notes = video.info().frames, ClipNotes()
         with frames_ahead(video, max_side=self.max_side) as pictures:
             for picture in pictures:
-                faces = detector.all_fast(picture.pixels)
-                odd.look(picture.pixels, faces)
+                faces = detector.detect_all_fast(picture.pixels)
+                clip_notes.add_frame(picture.pixels, faces)
                 if not faces:
                     self.left_out[frame_name(picture.frame)] = "no face found"
                 else:
-                    found = closer(detector, picture.pixels, faces[0])
+                    found = refine_small_face(detector, picture.pixels, faces[0])
                     self.seconds.append(picture.seconds)
                     self._add(frame_name(picture.frame), picture.frame, picture.pixels, found)
-                if report is not None:
-                    report(picture.frame + 1, max(total, picture.frame + 1))
+                if progress is not None:
+                    progress(picture.frame + 1, max(total, picture.frame + 1))
         name = portable_name(self.source)
-        self.notes += [f"{name}: {note}" for note in (*video.notes, *odd.notes)]
+        self.notes += [f"{name}: {note}" for note in (*video.notes, *clip_notes.notes)]
 
     def read_photos(
-        self, detector: LandmarkDetector, face: int | None, report: StepProgress | None
+        self, detector: LandmarkDetector, face: int | None, progress: StepProgress | None
     ) -> None:
-        """Every photo, looked at as closely as `LandmarkDetector.detect` does."""
+        """Every photo, by `LandmarkDetector.detect`."""
         folders = photo_files(self.source)
         self.notes += ignored_files(self.source)
         total = sum(map(len, folders.values()))
@@ -180,22 +183,22 @@ class _Gathered:
                 )
                 self._add_photo(name, number, path, detector, face)
                 number += 1
-                if report is not None:
-                    report(number, total)
+                if progress is not None:
+                    progress(number, total)
 
     def _add_photo(
         self, name: str, number: int, path: Path, detector: LandmarkDetector, face: int | None
     ) -> None:
         photo = load_photo(path, max_side=self.max_side)
-        self.told += [(name, note) for note in photo.notes]
+        self.picture_notes += [(name, note) for note in photo.notes]
         try:
             landmarks = detector.detect(photo, face=face)
         except EstimationError as error:
             self.left_out[name] = str(error).removeprefix(f"{photo.name}: ")
             return
-        self.told += [(name, note) for note in landmarks.notes]
+        self.picture_notes += [(name, note) for note in landmarks.notes]
         self.files.append(path)
-        self._add(name, number, photo.pixels, landmarks.as_face())
+        self._add(name, number, photo.pixels, landmarks.as_detected_face())
 
     def _add(
         self, name: str, number: int, pixels: UInt8[Array, "h w 3"], found: DetectedFace
@@ -203,13 +206,13 @@ class _Gathered:
         points = found.points[:, :2]
         self.names.append(name)
         self.sizes.append((pixels.shape[1], pixels.shape[0]))
-        # Of long videos nothing is kept that is not needed.
+        # A long video has many: single precision halves their memory.
         found = replace(found, points=found.points.astype(np.float32))
         self.rows.append((number, face_sharpness(pixels, points), found))
-        self.look(pixels, points)
+        self.on_picture(pixels, points)
 
     def series(self) -> FaceSeries:
-        """All of it."""
+        """The series. Raises: EstimationError: no picture shows a face."""
         if not self.rows:
             what = "frames" if self.is_video else "photos"
             reasons = [f"{name}: {reason}" for name, reason in self.left_out.items()]
@@ -226,13 +229,18 @@ class _Gathered:
             np.array(self.seconds) if self.is_video else None,
             self.max_side,
             self.left_out,
-            (*self.notes, *gathered_notes(self.told)),
+            (*self.notes, *merge_notes(self.picture_notes)),
             self.quarters,
         )
 
 
 def row_of(series: FaceSeries, what: str, option: str) -> int:
     """The row of a picture that a user names: a frame's number, a file's name, its stem.
+
+    Args:
+        series: the pictures.
+        what: what the user names.
+        option: the option that names it, for messages.
 
     Raises:
         InputError: there is none; several; one that shows no face.
@@ -251,16 +259,21 @@ def row_of(series: FaceSeries, what: str, option: str) -> int:
 
 
 def rows_of(series: FaceSeries, what: str, option: str) -> list[int]:
-    """As row_of, and all frames of a stretch where that is what the user names: `860-930`.
+    """As row_of, and all frames of a range such as `860-930`.
+
+    Args:
+        series: the pictures.
+        what: what the user names.
+        option: the option that names it, for messages.
 
     Raises:
-        InputError: as row_of; a stretch without a picture that shows the face.
+        InputError: as row_of; a range without a picture that shows the face.
     """
-    stretch = re.fullmatch(r"(\d{1,9})-(\d{1,9})", what, re.ASCII)
-    if not (series.is_video and stretch):
+    span = re.fullmatch(r"(\d{1,9})-(\d{1,9})", what, re.ASCII)
+    if not (series.is_video and span):
         return [row_of(series, what, option)]
     index = series.scores.index
-    rows = np.flatnonzero((index >= int(stretch[1])) & (index <= int(stretch[2])))
+    rows = np.flatnonzero((index >= int(span[1])) & (index <= int(span[2])))
     if not len(rows):
         raise InputError(option, "a stretch of frames that show the face", what)
     return rows.tolist()

@@ -1,4 +1,4 @@
-"""The detector's 478 landmarks of a face and how far each can be trusted."""
+"""The detector's 478 landmarks of a face, with a confidence for each."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from mien.arrays import Array, Bool, Float, Int, check_array, check_rotation, fr
 from mien.assets.landmark_sets import LANDMARK_COUNT
 from mien.capture.faces.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace
 
-CUT_SHARE = 0.02
-"""Of the face's width: how far over the edge of the picture a point may lie before the edge is said
-to cut the face."""
+CUT_TOLERANCE = 0.02
+"""Of the face's width: how far outside of the picture a point of an uncut face may lie."""
 
 
 @dataclass(frozen=True)
 class Landmarks:
-    """What the detector says of one face.
+    """The detector's result for one face.
 
     Attributes:
         points: (478, 2) px of the photo.
@@ -25,7 +24,7 @@ class Landmarks:
             roughly the inverse of the relative error; 0 outside of the photo.
         blendshapes: (52,) scores in [0, 1], ordered as `BLENDSHAPE_NAMES`: `_neutral`, then 51 of
             the ARKit units (no `tongueOut`).
-        R_cam_head: (3, 3) the detector's own idea of the head's rotation; good to some 10 degrees.
+        R_cam_head: (3, 3) the detector's rotation of the head; good to some 10 degrees.
         notes: what was odd.
     """
 
@@ -46,8 +45,8 @@ class Landmarks:
             self, "R_cam_head", frozen(check_rotation("R_cam_head", self.R_cam_head))
         )
 
-    def as_face(self) -> DetectedFace:
-        """As a look at a frame gives it; of depth nothing is known."""
+    def as_detected_face(self) -> DetectedFace:
+        """The same as a detection in a frame, with depth 0."""
         points = np.column_stack([self.points, np.zeros(LANDMARK_COUNT)])
         return DetectedFace(points, self.blendshapes, self.R_cam_head)
 
@@ -60,16 +59,13 @@ class Landmarks:
 def inside_picture(
     points: Float[Array, "n 2"], size: tuple[int, int] | Int[Array, " 2"]
 ) -> Bool[Array, " n"]:
-    """Which points lie in a picture of this width and height; what a detector says of the others
-
-    is a guess.
-    """
+    """Which points lie in a picture of this width and height; the others are extrapolated."""
     return np.all((points >= 0) & (points <= np.asarray(size)), axis=1)
 
 
 def is_cut(points: Float[Array, "n 2"], size: tuple[int, int] | Int[Array, " 2"]) -> bool:
     """Whether the edge of a picture of this width and height cuts a face with these points."""
-    room = CUT_SHARE * float(np.ptp(points[:, 0]))
+    room = CUT_TOLERANCE * float(np.ptp(points[:, 0]))
     return bool(((points < -room) | (points > np.asarray(size) + room)).any())
 
 
@@ -85,7 +81,7 @@ def cut_note(points: Float[Array, "n 2"], size: tuple[int, int]) -> tuple[str, .
 def facing_confidence(
     points: Float[Array, "n 3"], R_cam_head: Float[Array, "3 3"]
 ) -> Float[Array, " n"]:
-    """How far the surface under each landmark faces the camera, as a weight in [0, 1].
+    """A weight in [0, 1] by the angle between the surface under each landmark and the camera.
 
     Measured on seven views of a scan with known cameras (yaw -64 to 48 degrees): the distance
     between a landmark and the projection of its triangulated place is 2.6 px in the median where

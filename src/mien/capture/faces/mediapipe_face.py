@@ -1,4 +1,4 @@
-"""MediaPipe's face landmarker behind a small, quiet, typed door."""
+"""MediaPipe's face landmarker: typed, and without its messages on stderr."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ _Y_DOWN_Z_FORWARD = np.diag([1.0, -1.0, -1.0])
 
 @dataclass(frozen=True)
 class DetectedFace:
-    """One face as the network sees it.
+    """One face as the network detects it.
 
     Attributes:
         points: (478, 3) px of the image; z forward in the scale of x, its zero at the face.
@@ -104,7 +104,7 @@ class DetectedFace:
         return float(np.ptp(self.points[:, :2], axis=0).max())
 
     @property
-    def lips_apart(self) -> float:
+    def lip_gap(self) -> float:
         """Gap between the lips over the distance of the eyes."""
         gap = self.points[UPPER_LIP, :2] - self.points[LOWER_LIP, :2]
         eyes = self.points[RIGHT_IRIS, :2] - self.points[LEFT_IRIS, :2]
@@ -112,10 +112,9 @@ class DetectedFace:
 
 
 def yaw_pitch(R_cam_head: Float[Array, "3 3"]) -> tuple[float, float]:
-    """Radians: the head turned to its own left, and tipped down, as the camera sees it.
+    """Radians: the head turned to its own left, and tipped down, relative to the camera.
 
-    They say from where the camera looks at the head, so a picture that lies or stands on its head
-    has those of the same picture upright.
+    They are the camera's direction in head space, so a roll of the picture changes neither.
     """
     x, y, z = -R_cam_head[2]
     return float(-np.arcsin(np.clip(x, -1.0, 1.0))), float(np.arctan2(y, z))
@@ -160,7 +159,7 @@ class FaceNetwork:
             self._network.close()
 
     def faces(self, pixels: UInt8[Array, "h w 3"]) -> list[DetectedFace]:
-        """Every face that the network finds in an upright sRGB image, in no certain order."""
+        """Every face that the network finds in an upright sRGB image, in no particular order."""
         image = self._mediapipe.Image(
             image_format=self._mediapipe.ImageFormat.SRGB, data=np.ascontiguousarray(pixels)
         )
@@ -191,7 +190,7 @@ def _nearest_rotation(matrix: Array) -> Float[Array, "3 3"]:
 
 @contextmanager
 def _libraries_explained() -> Iterator[None]:
-    """A loader's error as one line that names the library and the remedy."""
+    """A loader's error as one line that names the library and how to install it."""
     try:
         yield
     except (ImportError, OSError) as error:
@@ -206,7 +205,7 @@ def _libraries_explained() -> Iterator[None]:
 
 @contextmanager
 def _quiet_stderr() -> Iterator[None]:
-    """Drop MediaPipe's chatter, and pass on whatever else is written meanwhile.
+    """Drop MediaPipe's log lines, and pass on whatever else is written meanwhile.
 
     It is written by C++ straight to file descriptor 2 before any option of MediaPipe's can take
     effect, hence the redirection.

@@ -5,18 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from mien.arrays import Array, Float, UInt8
-from mien.capture.images.photos import shrunk
+from mien.capture.images.photos import downscale
 
 _SIDE = 192
 _BLOCK = 8
 
 
 def face_sharpness(pixels: UInt8[Array, "h w 3"], points: Float[Array, "n 2"]) -> float:
-    """Variance of the Laplacian over the face, at one size for all and free of contrast, less where
+    """Variance of the Laplacian over the face, at a common size and normalized by contrast.
 
-    the edges are those of the coder's blocks.
+    Block artefacts of the coder lower it.
 
     Args:
+        pixels: (H, W, 3) sRGB.
         points: (N, 2) px of the face's landmarks; what lies outside of the picture is left out.
     """
     import cv2
@@ -26,16 +27,16 @@ def face_sharpness(pixels: UInt8[Array, "h w 3"], points: Float[Array, "n 2"]) -
     crop = pixels[low[1] : high[1], low[0] : high[0]]
     if crop.size == 0:
         return 0.0
-    small = np.ascontiguousarray(shrunk(crop, _SIDE))
+    small = np.ascontiguousarray(downscale(crop, _SIDE))
     grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float64)
     sharpness = float(cv2.Laplacian(grey, cv2.CV_64F).var() / (grey.var() + 1.0))
     return sharpness / _blockiness(pixels) ** 2
 
 
 def _blockiness(pixels: UInt8[Array, "h w 3"]) -> float:
-    """How much larger steps are at the borders of 8x8 blocks than inside: 1 where none shows.
+    """How much larger steps are at the borders of 8x8 blocks than inside: 1 without artefacts.
 
-    The first frames of a clip are often coded so coarsely that blocks are most of what they show.
+    The first frames of a clip are often coded so coarsely that their blocks dominate.
     """
     grey = pixels[..., 1].astype(np.float32)
     ratios = []

@@ -42,7 +42,7 @@ def to_eight_bits(image: Image, notes: list[str]) -> Image:
 
 
 def _without_alpha(image: Image, notes: list[str]) -> Image:
-    """Composited onto white, what most viewers show behind a cut-out."""
+    """Composited onto white, as most viewers show it."""
     from PIL import Image
 
     # Grey stays grey, as its colour profile may be one of grey.
@@ -56,8 +56,8 @@ def _without_alpha(image: Image, notes: list[str]) -> Image:
     return white.convert(colour)
 
 
-def to_srgb(image: Image, profile: bytes | None, notes: list[str]) -> Image:
-    """Mode RGB; samples converted through the file's colour profile where it has another one."""
+def convert_to_srgb(image: Image, profile: bytes | None, notes: list[str]) -> Image:
+    """Mode RGB; samples converted to sRGB where the file's colour profile is another one."""
     from PIL import ImageCms
 
     if profile:
@@ -80,11 +80,13 @@ def to_srgb(image: Image, profile: bytes | None, notes: list[str]) -> Image:
     return image if image.mode == "RGB" else image.convert("RGB")
 
 
-def from_hdr(image: Image, coded: Mapping[str, Any], notes: list[str]) -> Image:
+def tone_map_hdr(image: Image, coded: Mapping[str, Any], notes: list[str]) -> Image:
     """Mode RGB; a picture coded in PQ or HLG, as some cameras' HEICs are, in sRGB.
 
     Args:
-        coded: what the container says of its colours, by the names of HEIF's `nclx` box.
+        image: in mode RGB.
+        coded: the container's colour description, by the names of HEIF's `nclx` box.
+        notes: gains one where the picture is HDR.
     """
     from mien.capture.images import hdr
 
@@ -95,4 +97,4 @@ def from_hdr(image: Image, coded: Mapping[str, Any], notes: list[str]) -> Image:
 
     notes.append(f"HDR photo ({hdr.HDR[transfer]}): its colours are mapped to sRGB")
     codes = np.asarray(image).astype(np.uint16) * 257
-    return Image.fromarray(hdr.to_srgb(codes, transfer, coded.get("color_primaries", 0)))
+    return Image.fromarray(hdr.hdr_to_srgb(codes, transfer, coded.get("color_primaries", 0)))

@@ -23,13 +23,13 @@ _CROP_TOLERANCE = 0.01
 
 
 def orientation(image: Image) -> int:
-    """How the pixels are still to be turned, 1 (upright) to 8; 1 when absent or senseless.
+    """EXIF orientation still to be applied, 1 (upright) to 8; 1 when absent or senseless.
 
-    Of an image whose pixels are loaded, for some decoders turn them themselves then.
+    The image's pixels must be loaded: some decoders turn them themselves then.
     """
     turn = image.getexif().get(_ORIENTATION, 1)
     if image.format == "HEIF":
-        # Where the container says it, the pixels are turned already, and what EXIF says is void.
+        # Where the container states it, the pixels are turned already, and EXIF's is void.
         path = Path(cast(Any, image).filename)
         turn = 1 if _turned_by_container(path) else image.info.get(_HEIF_TURN) or 1
     return turn if turn in range(1, 9) else 1
@@ -47,7 +47,7 @@ def focal_prior_px(image: Image) -> tuple[float | None, list[str]]:
 
     From the 35 mm equivalent (by the diagonal), else from the focal length in mm and the focal
     plane's resolution. None when the file states neither, or was visibly cropped since: its
-    numbers then speak of a picture that is no longer there.
+    numbers are those of the picture before.
     """
     tags = image.getexif().get_ifd(_EXIF_IFD)
     width, height = image.size

@@ -48,7 +48,9 @@ _TO_SRGB = {
 }
 
 
-def to_srgb(codes: UInt16[Array, "h w 3"], transfer: int, primaries: int) -> UInt8[Array, "h w 3"]:
+def hdr_to_srgb(
+    codes: UInt16[Array, "h w 3"], transfer: int, primaries: int
+) -> UInt8[Array, "h w 3"]:
     """HDR pixels as sRGB.
 
     Args:
@@ -77,7 +79,7 @@ def to_srgb(codes: UInt16[Array, "h w 3"], transfer: int, primaries: int) -> UIn
 
 @dataclass(frozen=True)
 class _Tables:
-    """What depends on the transfer characteristic alone.
+    """Lookup tables of a transfer characteristic.
 
     Attributes:
         linear: of a code, scene light in [0, 1] for HLG, display light over WHITE for PQ.

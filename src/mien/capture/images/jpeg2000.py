@@ -1,4 +1,4 @@
-"""JPEG 2000 with more than 8 bits a sample, which Pillow spoils: it makes white black."""
+"""JPEG 2000 with more than 8 bits a sample, which Pillow decodes wrongly (white becomes black)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PRECISION = 42
 
 
 def eight_bits_if_deep(image: Image) -> Image | None:
-    """The picture in mode RGB, if it is such a one in colour; None for every other.
+    """The picture in mode RGB, if it is JPEG 2000 in colour of more than 8 bits; otherwise None.
 
     Raises:
         UnreadSamplesError: it has transparent parts, or is not read here.

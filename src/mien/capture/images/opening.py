@@ -1,4 +1,4 @@
-"""The one way in which image files are opened."""
+"""Opening image files: the kinds that are read, and errors in one line."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mien.capture.images.unsupported import unread_kind
+from mien.capture.images.unsupported import unsupported_kind
 from mien.errors import FileFormatError, InputError, one_line
 from mien.reading.files import check_readable, describe_content
 
@@ -38,15 +38,16 @@ _EXPECTED = "an image (JPEG, PNG, HEIC, ...)"
 
 
 class UnreadSamplesError(ValueError):
-    """Of an image that is whole, but whose samples are of a kind that is not read."""
+    """A whole image whose samples are of a kind that is not read."""
 
 
 @contextmanager
-def opened_image(path: str | Path, notes: list[str], *, kind: str = "a photo") -> Iterator[Image]:
+def open_image(path: str | Path, notes: list[str], *, kind: str = "a photo") -> Iterator[Image]:
     """The file as a Pillow image; whatever goes wrong while it is open becomes one clear line.
 
     Args:
-        notes: gains what its decoder finds odd.
+        path: the file.
+        notes: gains the decoder's warnings.
         kind: what the file should be, for messages.
 
     Raises:
@@ -66,7 +67,7 @@ def opened_image(path: str | Path, notes: list[str], *, kind: str = "a photo") -
                 if image.width * image.height > MAX_PIXELS:
                     raise _too_large(path, f"{image.width}x{image.height}")
                 # Cameras wrap their RAW files as TIFFs of the preview.
-                if image.format == "TIFF" and unread_kind(path):
+                if image.format == "TIFF" and unsupported_kind(path):
                     raise UnidentifiedImageError
                 yield image
         except FileFormatError:
@@ -74,7 +75,7 @@ def opened_image(path: str | Path, notes: list[str], *, kind: str = "a photo") -
         except Image.DecompressionBombError:
             raise _too_large(path, "more") from None
         except UnidentifiedImageError:
-            found = unread_kind(path) or describe_content(path)
+            found = unsupported_kind(path) or describe_content(path)
             raise FileFormatError(path, f"expected {_EXPECTED}, found {found}") from None
         except UnreadSamplesError as error:
             raise FileFormatError(path, f"expected 8 or 16 bits a sample, found {error}") from None
@@ -86,11 +87,11 @@ def opened_image(path: str | Path, notes: list[str], *, kind: str = "a photo") -
 
 
 def is_image(path: Path) -> bool:
-    """Whether the file begins like an image that shows one picture; one that moves is a clip."""
+    """Whether the file begins like a still image; an animated one is a clip."""
     try:
-        with opened_image(path, []) as image:
-            moves = image.format in ("GIF", "PNG") and getattr(image, "n_frames", 1) > 1
-            return not moves
+        with open_image(path, []) as image:
+            animated = image.format in ("GIF", "PNG") and getattr(image, "n_frames", 1) > 1
+            return not animated
     except FileFormatError as error:
         return _EXPECTED not in error.problem
     except InputError:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mien.arrays import Array, UInt8, check_image, check_positive, frozen
 from mien.capture.images.exif import focal_prior_px, orientation
-from mien.capture.images.opening import opened_image
+from mien.capture.images.opening import open_image
 from mien.reading.names import check_path, portable_name
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ _JPEG_2000 = (".jp2", ".jpf", ".jpx", ".j2k", ".j2c", ".jpc")
 _OTHER = (".png", ".tif", ".tiff", ".webp", ".bmp", ".dib", ".gif", ".ppm", ".pgm", ".pbm", ".pnm")
 _HEIF = (".heic", ".heif", ".hif", ".avif")
 PHOTO_SUFFIXES = frozenset((*_JPEG, *_JPEG_2000, *_HEIF, *_OTHER))
-"""Endings (lower case) by which a folder's photos are told from its other files."""
+"""Endings (lower case) of the files of a folder that are photos."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Photo:
         pixels: (H, W, 3) uint8 sRGB after orientation, read-only.
         focal_prior_px: focal length that the file states, in px of `pixels`, or None.
         original_size: (width, height) in px after orientation, before any downscaling.
-        notes: what was done to the picture that its owner may want to know.
+        notes: what was done to the picture, for its owner.
     """
 
     name: str
@@ -86,7 +86,7 @@ def load_photo(path: str | Path, *, max_side: int = DEFAULT_MAX_SIDE) -> Photo:
     path = check_path("photo", path, "a photo")
     check_positive("max_side", max_side)
     notes: list[str] = []
-    with opened_image(path, notes) as image:
+    with open_image(path, notes) as image:
         original = image.size
         focal_per_px, focal_note = focal_prior_px(image)
         notes += focal_note
@@ -104,8 +104,8 @@ def load_photo(path: str | Path, *, max_side: int = DEFAULT_MAX_SIDE) -> Photo:
     return Photo(portable_name(path), path, pixels, focal, original, tuple(notes))
 
 
-def shrunk(pixels: UInt8[Array, "h w 3"], side: int) -> UInt8[Array, "h w 3"]:
-    """At most `side` px long, by averaging; the same array when it is that already."""
+def downscale(pixels: UInt8[Array, "h w 3"], side: int) -> UInt8[Array, "h w 3"]:
+    """The picture at most `side` px long, by averaging; the same array when it is that already."""
     import cv2
 
     height, width = pixels.shape[:2]
@@ -124,7 +124,7 @@ def _shrunk_rgb(image: Image, max_side: int, notes: list[str]) -> Image:
     """
     from PIL import Image
 
-    from mien.capture.images.colour import from_hdr, to_eight_bits, to_srgb
+    from mien.capture.images.colour import convert_to_srgb, to_eight_bits, tone_map_hdr
     from mien.capture.images.jpeg2000 import eight_bits_if_deep
 
     factor = min(1.0, max_side / max(image.size))
@@ -139,7 +139,9 @@ def _shrunk_rgb(image: Image, max_side: int, notes: list[str]) -> Image:
     eight_bits = eight_bits_if_deep(image) or to_eight_bits(image, notes)
     if eight_bits.size != target and factor < 1:
         eight_bits = eight_bits.resize(target, Image.Resampling.LANCZOS, reducing_gap=2.0)
-    return from_hdr(to_srgb(eight_bits, profile, notes), {} if profile else coded, notes)
+    return tone_map_hdr(
+        convert_to_srgb(eight_bits, profile, notes), {} if profile else coded, notes
+    )
 
 
 def _turned(image: Image, turn: int) -> Image:

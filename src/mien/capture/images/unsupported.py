@@ -1,4 +1,4 @@
-"""Kinds of pictures that people have and that are not read: told by name, and what to do."""
+"""Kinds of pictures that are not read, by the endings of their names, and what to do instead."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ _KINDS = (
 _BY_SUFFIX = {suffix: advice for suffixes, advice in _KINDS for suffix in suffixes.split()}
 
 
-def unread_kind(path: Path) -> str:
+def unsupported_kind(path: Path) -> str:
     """`a .cr3 file (camera RAW: export as JPEG or TIFF)`; "" if the name says no such thing."""
     suffix = path.suffix.lower()
     return f"a {suffix} file ({_BY_SUFFIX[suffix]})" if suffix in _BY_SUFFIX else ""
 
 
-def is_unread(path: Path) -> bool:
-    """Whether the name says that it is a picture of a kind that is not read."""
+def is_unsupported(path: Path) -> bool:
+    """Whether the name is that of a picture of a kind that is not read."""
     return path.suffix.lower() in _BY_SUFFIX
 
 
-def counted(paths: Iterable[Path]) -> list[str]:
+def count_by_kind(paths: Iterable[Path]) -> list[str]:
     """`12 .cr3 files (camera RAW: ...)` for each kind among unread files."""
     counts = Counter(path.suffix.lower() for path in paths)
     return [

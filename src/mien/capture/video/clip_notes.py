@@ -1,4 +1,4 @@
-"""What is odd about the faces of a clip, counted over its frames and said once."""
+"""Notes on the faces of a clip, counted over its frames."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ class ClipNotes:
     """Counts frames, those with several faces, and those whose edge cuts the face."""
 
     frames: int = 0
-    several: int = 0
+    several_faces: int = 0
     cut: int = 0
 
-    def look(self, pixels: UInt8[Array, "h w 3"], faces: Sequence[DetectedFace]) -> None:
-        """Take in a frame and its faces, px of the frame, the one that is used first."""
+    def add_frame(self, pixels: UInt8[Array, "h w 3"], faces: Sequence[DetectedFace]) -> None:
+        """Count a frame and its faces, px of the frame, the one that is used first."""
         self.frames += 1
-        self.several += len(faces) > 1
+        self.several_faces += len(faces) > 1
         size = (pixels.shape[1], pixels.shape[0])
         self.cut += bool(faces) and is_cut(faces[0].points[:, :2], size)
 
@@ -29,8 +29,8 @@ class ClipNotes:
     def notes(self) -> list[str]:
         """One of each kind."""
         notes = []
-        if self.several:
-            frames = f"{self.several} of {self.frames} frames"
+        if self.several_faces:
+            frames = f"{self.several_faces} of {self.frames} frames"
             notes.append(f"several faces in {frames}: the largest of each is used")
         if self.cut:
             notes.append(f"the edge cuts the face in {self.cut} of {self.frames} frames")

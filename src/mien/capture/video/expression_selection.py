@@ -11,9 +11,9 @@ from mien.capture.video.frame_selection import FrameScores, expression_distance,
 MIN_DISTANCE = 0.55
 """Scores that two expressions of one person differ by at least."""
 MAX_EXPRESSIONS = 8
-"""As many expressions besides neutral are picked unless a number is asked for."""
+"""Expressions besides neutral, unless a number is asked for."""
 _NEAR = 0.25
-"""Frames this near to the one that was sought show the same expression: the sharpest will do."""
+"""Frames this near to the farthest one show the same expression: the sharpest is taken."""
 _MAX_YAW = np.radians(25)
 """One frame has to show the whole face."""
 
@@ -46,9 +46,9 @@ _WORDS = {
     "noseSneer": "sneer",
 }
 _FALLING = {"browInnerUp": "brows_down", "browOuterUp": "brows_down"}
-"""The detector sees lowered brows less in their own score than in what it has of raised ones."""
-_LEAST_SCORE = 0.2
-"""What changes less has no part in an expression's name."""
+"""Lowered brows show less in their own score than in that of raised ones."""
+_MIN_CHANGE = 0.2
+"""Scores that change less have no part in an expression's name."""
 
 
 def choose_expressions(
@@ -60,8 +60,9 @@ def choose_expressions(
     all that are chosen, as long as that is a different expression and not more than `count`.
 
     Args:
+        scores: of the frames.
         neutral: row of a frame with the face at rest.
-        count: as many at most; None picks up to 8.
+        count: how many at most; None picks up to 8.
     """
     rows = sharp_rows(scores, np.flatnonzero(np.abs(scores.pose[:, 0]) <= _MAX_YAW))
     distance = expression_distance(scores.blendshapes, neutral)
@@ -82,7 +83,7 @@ def choose_expressions(
 def name_expressions(
     blendshapes: Float[Array, "n 52"], neutral: Float[Array, " 52"]
 ) -> tuple[str, ...]:
-    """A name for each by what changes most: "smile"; where that is taken, "smile-brows_up".
+    """A name for each by the scores that change most: "smile"; if that is taken, "smile-brows_up".
 
     Args:
         blendshapes: scores of N expressions.
@@ -98,11 +99,11 @@ def name_expressions(
 
 
 def _words(change: Float[Array, " 52"]) -> list[str]:
-    """What changes, from the most on, each once."""
+    """Words for the scores that change, the largest change first, each once."""
     found: dict[str, None] = {}
     for k in np.argsort(-np.abs(change)):
         unit = BLENDSHAPE_NAMES[k].removesuffix("Left").removesuffix("Right")
         words = _WORDS if change[k] > 0 else _FALLING
-        if abs(change[k]) >= _LEAST_SCORE and unit in words:
+        if abs(change[k]) >= _MIN_CHANGE and unit in words:
             found[words[unit]] = None
     return list(found)

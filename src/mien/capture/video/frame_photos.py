@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from contextlib import closing
 
-from mien.capture.images.photos import Photo, shrunk
+from mien.capture.images.photos import Photo, downscale
 from mien.capture.video.video import Video
 
 
@@ -15,23 +15,25 @@ def frame_name(index: int) -> str:
 
 
 def fetch_frames(
-    video: Video, wanted: Collection[int], max_side: int, report: Callable[[int], None]
+    video: Video, wanted: Collection[int], max_side: int, on_frame: Callable[[int], None]
 ) -> Iterator[tuple[int, Photo]]:
     """The wanted frames as photos, with their numbers, in the clip's order.
 
     Args:
+        video: the clip.
+        wanted: numbers of frames.
         max_side: px; larger pictures are reduced to it.
-        report: told the number of every frame that is read.
+        on_frame: called with the number of every frame that is read.
     """
     last = max(wanted, default=-1)
     with closing(video.frames()) as frames:
         for frame in frames:
             if frame.index > last:
                 return
-            report(frame.index)
+            on_frame(frame.index)
             if frame.index in wanted:
                 pixels = frame.pixels()
                 size = pixels.shape[1], pixels.shape[0]
-                small = shrunk(pixels, max_side)
+                small = downscale(pixels, max_side)
                 name = frame_name(frame.index)
                 yield frame.index, Photo(name, video.path, small, original_size=size)

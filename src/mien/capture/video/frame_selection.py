@@ -1,7 +1,4 @@
-"""Which frames of a clip make good photos of a head at rest: sharp, alike in expression, unlike in
-
-pose.
-"""
+"""Selection of a clip's frames of the head at rest: sharp, of one expression, of many poses."""
 
 from __future__ import annotations
 
@@ -18,35 +15,37 @@ MAX_YAW = np.radians(50)
 """Past this the detector's landmarks are poor or missing."""
 
 # Gaze follows the head and moves nothing that matters; "_neutral" is constant.
-_SHAPED = np.array([name[0] != "_" and not name.startswith("eyeLook") for name in BLENDSHAPE_NAMES])
-_OF_MOUTH = np.array([name.startswith(("mouth", "jaw", "cheekPuff")) for name in BLENDSHAPE_NAMES])
+_EXPRESSIVE = np.array(
+    [name[0] != "_" and not name.startswith("eyeLook") for name in BLENDSHAPE_NAMES]
+)
+_MOUTH = np.array([name.startswith(("mouth", "jaw", "cheekPuff")) for name in BLENDSHAPE_NAMES])
 _SAME_EXPRESSION = 0.6
-_OPEN_LIPS = 4.0
-"""What lips that are apart by the distance of the eyes cost, in scores."""
-_RESTLESS, _AT_REST = 0.35, 0.1
-"""How much less at rest a frame may be than the one most at rest: where the head turns, for scores
-shift with it, and where it does not."""
-_SHARP_SHARE = 0.5
+_LIP_GAP_COST = 4.0
+"""Score that is added for a lip gap of one eye distance."""
+_MAX_EXCESS, _MAX_EXCESS_STILL = 0.35, 0.1
+"""Distance from rest beyond the smallest one of all frames: where the head turns, as scores shift
+with it, and where it does not."""
+_MIN_SHARPNESS = 0.5
 _SAME_POSE, _ONE_SIDE = np.radians(3), np.radians(10)
 
 
 @dataclass(frozen=True)
 class FrameScores:
-    """What was measured on the sampled frames that show a face.
+    """Measures of the sampled frames that show a face.
 
     Attributes:
         index: frame numbers in the clip, from 0.
-        sharpness: any measure that grows with it.
+        sharpness: in any unit.
         pose: yaw and pitch in radians.
         blendshapes: the detector's scores.
-        lips_apart: gap between the lips over the distance of the eyes.
+        lip_gap: gap between the lips over the eye distance.
     """
 
     index: Int[Array, " n"]
     sharpness: Float[Array, " n"]
     pose: Float[Array, "n 2"]
     blendshapes: Float[Array, "n 52"]
-    lips_apart: Float[Array, " n"]
+    lip_gap: Float[Array, " n"]
 
     @classmethod
     def of(
@@ -58,7 +57,7 @@ class FrameScores:
             np.array(sharpness),
             np.array([yaw_pitch(face.R_cam_head) for face in faces]),
             np.array([face.blendshapes for face in faces]),
-            np.array([face.lips_apart for face in faces]),
+            np.array([face.lip_gap for face in faces]),
         )
 
 
@@ -66,16 +65,20 @@ def choose_frames(scores: FrameScores, count: int) -> Int[Array, " m"]:
     """Rows of `scores`, at most `count`, in the clip's order; at least one.
 
     Among frames that are sharp and show the face at rest, begins with the most frontal one and goes
-    on to whichever pose is farthest from all chosen so far, taking the
-    sharpest frame near that pose, until every pose left is within 3 degrees of a chosen one. Where
-    the head turns by less than 10 degrees, the sharpest of those most at rest is enough.
+    on to whichever pose is farthest from all chosen so far, taking the sharpest frame near that
+    pose, until every pose left is within 3 degrees of a chosen one. Where the head turns by less
+    than 10 degrees, the sharpest of those most at rest is enough.
+
+    Args:
+        scores: of the frames.
+        count: how many at most.
     """
     usable = _usable(scores)
     pose, sharpness = scores.pose[usable], scores.sharpness[usable]
     if np.ptp(pose, axis=0).max() < _ONE_SIDE:
-        # More would tell no depth, and blur the texture.
-        unrest = _unrest(scores)[usable]
-        at_rest = unrest <= unrest.min() + _AT_REST
+        # More views would not determine depth, and blur the texture.
+        distances = _distance_from_rest(scores)[usable]
+        at_rest = distances <= distances.min() + _MAX_EXCESS_STILL
         return usable[[int(np.where(at_rest, sharpness, -np.inf).argmax())]]
     distance = np.linalg.norm(pose, axis=1)
     target = int(distance.argmin())
@@ -91,36 +94,36 @@ def choose_frames(scores: FrameScores, count: int) -> Int[Array, " m"]:
 
 
 def _usable(scores: FrameScores) -> Int[Array, " m"]:
-    """Rows within reach of the detector, at rest, and sharp for their kind."""
+    """Rows of frames near enough to frontal, at rest, and sharp beside the others."""
     frontal = np.abs(scores.pose[:, 0]) <= MAX_YAW
     rows = np.flatnonzero(frontal if frontal.any() else np.ones_like(frontal))
-    unrest = _unrest(scores)[rows]
-    most = int(unrest.argmin())
+    distances = _distance_from_rest(scores)[rows]
+    most = int(distances.argmin())
     alike = expression_distance(scores.blendshapes[rows], most) <= _SAME_EXPRESSION
-    rows = rows[alike & (unrest <= unrest[most] + _RESTLESS)]
+    rows = rows[alike & (distances <= distances[most] + _MAX_EXCESS)]
     return sharp_rows(scores, rows)
 
 
 def sharp_rows(scores: FrameScores, rows: Int[Array, " n"]) -> Int[Array, " m"]:
-    """Those of the rows that are not blurred beside the others."""
+    """Those of the rows that are not blurred, by the median sharpness of all."""
     if not len(rows):
         return rows
     sharpness = scores.sharpness[rows]
-    return rows[sharpness >= _SHARP_SHARE * np.median(sharpness)]
+    return rows[sharpness >= _MIN_SHARPNESS * np.median(sharpness)]
 
 
-def _unrest(scores: FrameScores) -> Float[Array, " n"]:
-    """How far each frame is from a face at rest.
+def _distance_from_rest(scores: FrameScores) -> Float[Array, " n"]:
+    """Distance of each frame's expression from a face at rest.
 
-    A mouth at rest is closed. What brows and eyes do at rest differs between people, as do the
-    scores that the detector gives for it: it is what they do most of the time.
+    A mouth at rest is closed. Brows and eyes at rest differ between people, as do their scores:
+    their rest is the median over the frames.
     """
-    upper, mouth = scores.blendshapes[:, _SHAPED & ~_OF_MOUTH], scores.blendshapes[:, _OF_MOUTH]
-    usual = np.linalg.norm(upper - np.median(upper, axis=0), axis=1)
-    return usual + np.linalg.norm(mouth, axis=1) + _OPEN_LIPS * scores.lips_apart
+    upper, mouth = scores.blendshapes[:, _EXPRESSIVE & ~_MOUTH], scores.blendshapes[:, _MOUTH]
+    brows_and_eyes = np.linalg.norm(upper - np.median(upper, axis=0), axis=1)
+    return brows_and_eyes + np.linalg.norm(mouth, axis=1) + _LIP_GAP_COST * scores.lip_gap
 
 
 def expression_distance(blendshapes: Float[Array, "n 52"], row: int) -> Float[Array, " n"]:
-    """How far each frame's expression is from that of one: 0.2 is alike, 1.5 a broad smile."""
-    shaped = blendshapes[:, _SHAPED]
+    """Distance of each frame's expression from that of one row: 0.2 is alike, 1.5 a broad smile."""
+    shaped = blendshapes[:, _EXPRESSIVE]
     return np.linalg.norm(shaped - shaped[row], axis=1)

@@ -1,4 +1,4 @@
-"""Pictures of a video, decoded in a thread while the ones before are worked on."""
+"""Frames of a video, decoded in a thread while earlier ones are processed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mien.arrays import Array, UInt8
 from mien.capture.video.video import Video
 
 AHEAD = 4
-"""Pictures decoded ahead: enough to even out what some frames take more than others."""
+"""Frames decoded ahead: enough to even out that some take longer than others."""
 
 T = TypeVar("T")
 
@@ -40,13 +40,14 @@ def frames_ahead(
 ) -> Iterator[Iterator[DecodedFrame]]:
     """The pictures of a video in order, while the block runs; at most `ahead` wait in memory.
 
-    Decoding and converting run without Python's global lock, and so beside what the block does.
+    Decoding and converting run without Python's global lock, so in parallel with the block.
+    Iterating raises what `Video.frames` raises.
 
     Args:
+        video: the clip.
         start: the first that is wanted; those before are decoded but not converted.
         max_side: as for `Frame.pixels`.
-
-    Raises, while iterating: as `Video.frames`.
+        ahead: how many are decoded ahead.
     """
     with read_ahead(_pictures(video, start, max_side), ahead) as pictures:
         yield pictures
@@ -68,7 +69,7 @@ def read_ahead(items: Generator[T], ahead: int) -> Iterator[Iterator[T]]:
 
 def _in_turn(items: Iterator[T], ahead: int, thread: Executor) -> Iterator[T]:
     def take() -> tuple[T, ...]:
-        # A future cannot hold StopIteration: an empty tuple tells the end.
+        # A future cannot hold StopIteration: an empty tuple stands for the end.
         return tuple(islice(items, 1))
 
     waiting = deque(thread.submit(take) for _ in range(ahead))

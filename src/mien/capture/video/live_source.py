@@ -1,4 +1,4 @@
-"""Pictures as they come: what every live source gives, and a video that stands in for a camera."""
+"""Live pictures: what every live source gives, and a video played as if it were a camera."""
 
 from __future__ import annotations
 
@@ -13,39 +13,40 @@ from mien.capture.video.frames_ahead import AHEAD, read_ahead
 from mien.capture.video.video import Frame, Video
 
 
-class Shot(Protocol):
+class UnconvertedPicture(Protocol):
     """A picture that is not yet converted; `mien.capture.video.video.Frame` is one."""
 
-    def pixels(self, *, max_side: int | None = None) -> UInt8[Array, "h w 3"]: ...
+    def pixels(self, *, max_side: int | None = None) -> UInt8[Array, "h w 3"]:
+        """As `LiveFrame.pixels`."""
 
 
 @dataclass(frozen=True)
 class LiveFrame:
-    """A picture, and when it was taken.
+    """A picture with its time.
 
     Attributes:
         index: from 0; those that were dropped are counted.
         seconds: since the source's first picture.
         taken: when it was, by the source's clock.
-        shot: the picture.
+        picture: the picture.
     """
 
     index: int
     seconds: float
     taken: float
-    shot: Shot
+    picture: UnconvertedPicture
 
     def pixels(self, *, max_side: int | None = None) -> UInt8[Array, "h w 3"]:
         """(H, W, 3) sRGB, upright; reduced where its longer side is longer than `max_side` px."""
-        return self.shot.pixels(max_side=max_side)
+        return self.picture.pixels(max_side=max_side)
 
 
 class LiveSource(Protocol):
-    """Where pictures come from in real time.
+    """A source of pictures in real time.
 
     Attributes:
-        width: of the pictures, upright, px.
-        height: of the pictures, upright, px.
+        width: of the upright pictures, px.
+        height: of the upright pictures, px.
         fps: frames a second, as stated.
         dropped: how many pictures came while nobody was ready for them.
         notes: what was odd; grows while frames are read.
@@ -61,15 +62,16 @@ class LiveSource(Protocol):
         """The newest picture whenever one is asked for, waiting for it if need be."""
 
     def close(self) -> None:
-        """Let go of the device; a second time does nothing."""
+        """Release the device; a second time does nothing."""
 
 
 class PacedVideo:
-    """A video file that stands in for a camera: a picture is there when its time has come.
+    """A video file played as if it were a camera: a picture is there when its time has come.
 
     Args:
-        clock: seconds now, and waiting for so many.
-        sleep: seconds now, and waiting for so many.
+        path: the video.
+        clock: gives the time in seconds.
+        sleep: waits for so many seconds.
 
     Raises:
         InputError: as `Video.frames`.
@@ -84,7 +86,7 @@ class PacedVideo:
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._video, self._clock, self._sleep = Video(Path(path)), clock, sleep
-        facts = self._video.facts()
+        facts = self._video.info()
         self.width, self.height, self.fps = facts.width, facts.height, facts.fps
         self.dropped = 0
         self.notes = self._video.notes

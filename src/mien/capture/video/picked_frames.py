@@ -11,7 +11,7 @@ from mien.arrays import Array, Int, check_positive
 from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.faces.mediapipe_face import DetectedFace
 from mien.capture.faces.sharpness import face_sharpness
-from mien.capture.images.photos import DEFAULT_MAX_SIDE, Photo, shrunk
+from mien.capture.images.photos import DEFAULT_MAX_SIDE, Photo, downscale
 from mien.capture.video.clip_notes import ClipNotes
 from mien.capture.video.expression_selection import choose_expressions, name_expressions
 from mien.capture.video.frame_photos import fetch_frames
@@ -30,12 +30,12 @@ _ANALYSIS_SIDE = 640
 
 @dataclass(frozen=True)
 class PickedFrames:
-    """What a clip gives for a head.
+    """The frames of a clip that are chosen for a head.
 
     Attributes:
         expressions: photos by expression, "neutral" first. Photos are called `frame_000123.png` by
             the frame's number from 0.
-        notes: what was odd.
+        notes: what was clip_notes.
     """
 
     expressions: dict[str, tuple[Photo, ...]]
@@ -53,13 +53,16 @@ def pick_frames(
 ) -> PickedFrames:
     """Sharp frames with diverse poses of the head at rest, and one of each other expression.
 
-    The clip is decoded twice: once to judge up to 240 frames (10 a second at most), once to fetch
+    The clip is decoded twice: once to score up to 240 frames (10 a second at most), once to fetch
     the chosen ones, so that memory stays small however long and large it is.
 
     Args:
-        count: of neutral as many at most; fewer when the head turns little.
-        expressions: as many others at most; None takes what differs, up to 8; 0 neutral alone.
-        progress: told (done, total) frames of both passes; the total is an estimate.
+        path: the clip.
+        count: how many of neutral at most; fewer when the head turns little.
+        expressions: how many others at most; None takes those that differ, up to 8; 0 none.
+        detector: finds the face.
+        max_side: px; larger frames are reduced to it.
+        progress: called with (done, total) frames of both passes; the total is an estimate.
 
     Raises:
         InputError: no such file, not readable, `count` not positive.
@@ -69,8 +72,8 @@ def pick_frames(
     check_positive("count", count)
     video = Video(Path(path))
     turn_upright(video, detector)
-    report = _two_passes(progress, video.facts().frames)
-    scores = _judge(video, detector, report)
+    report = _two_passes(progress, video.info().frames)
+    scores = _score_frames(video, detector, report)
     rows = _choose_rows(scores, count, expressions)
     wanted = {int(scores.index[row]) for chosen in rows.values() for row in chosen}
     photos = dict(fetch_frames(video, wanted, max_side, lambda frame: report(1, frame)))
@@ -113,11 +116,11 @@ def _two_passes(progress: StepProgress | None, frames: int) -> StepProgress:
     return report
 
 
-def _judge(video: Video, detector: LandmarkDetector, report: StepProgress) -> FrameScores:
+def _score_frames(video: Video, detector: LandmarkDetector, report: StepProgress) -> FrameScores:
     """Scores of the frames, evenly spread in time, that show a face."""
-    step = max(_SAMPLE_SECONDS, (video.facts().seconds or 0) / MAX_SAMPLES)
+    step = max(_SAMPLE_SECONDS, (video.info().seconds or 0) / MAX_SAMPLES)
     rows: list[tuple[int, float, DetectedFace]] = []
-    odd = ClipNotes()
+    clip_notes = ClipNotes()
     due = -np.inf
     for frame in video.frames():
         report(0, frame.index)
@@ -126,13 +129,13 @@ def _judge(video: Video, detector: LandmarkDetector, report: StepProgress) -> Fr
             continue
         due = frame.seconds + step
         pixels = frame.pixels()
-        small = shrunk(pixels, _ANALYSIS_SIDE)
-        faces = detector.all_fast(small)
-        odd.look(small, faces)
+        small = downscale(pixels, _ANALYSIS_SIDE)
+        faces = detector.detect_all_fast(small)
+        clip_notes.add_frame(small, faces)
         if faces:
             points = faces[0].points[:, :2] * (max(pixels.shape) / max(small.shape))
             rows.append((frame.index, face_sharpness(pixels, points), faces[0]))
     if not rows:
         raise EstimationError(f"{video.path}: no face found in any of its frames")
-    video.notes += odd.notes
+    video.notes += clip_notes.notes
     return FrameScores.of(*zip(*rows, strict=True))

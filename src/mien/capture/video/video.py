@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mien.arrays import Array, UInt8, UInt16
-from mien.capture.images.hdr import HDR, to_srgb
+from mien.capture.images.hdr import HDR, hdr_to_srgb
 from mien.capture.images.opening import MAX_PIXELS, is_image
-from mien.capture.video.display_matrix import Display, display_of
+from mien.capture.video.display_matrix import DisplayTransform, display_transform
 from mien.errors import FileFormatError, one_line
 from mien.reading.files import check_readable, describe_content
 
@@ -42,7 +42,7 @@ CONTAINERS = (
     "hevc",
     "gif",
     "apng",
-    # Of these it can be said that they hold no pictures.
+    # These are opened to say that they hold no pictures.
     "wav",
     "mp3",
     "aac",
@@ -74,12 +74,12 @@ class Frame:
     index: int
     seconds: float
     stored_size: tuple[int, int]
-    display: Display
+    display: DisplayTransform
     raw: VideoFrame
 
     @property
     def hdr(self) -> str:
-        """ "HLG" or "PQ", if it is coded so for a brighter range than sRGB's; else ""."""
+        """The HDR transfer characteristic, "HLG" or "PQ"; "" for a picture that is not HDR."""
         return HDR.get(self.raw.color_trc, "")
 
     @property
@@ -100,21 +100,21 @@ class Frame:
         how = "AREA" if height < self.raw.height else "BILINEAR"
         if self.hdr:
             codes = _sixteen_bits(self.raw, width, height, how)
-            stored = to_srgb(codes, self.raw.color_trc, self.raw.color_primaries)
+            stored = hdr_to_srgb(codes, self.raw.color_trc, self.raw.color_primaries)
         else:
             stored = self.raw.to_ndarray(
                 format="rgb24", width=width, height=height, interpolation=how
             )
-        return self.display.show(stored)
+        return self.display.apply(stored)
 
 
 @dataclass(frozen=True)
-class VideoFacts:
-    """What a file states of its pictures, and its first one shows.
+class VideoInfo:
+    """Size, rate and length of a clip, as the file states them and its first picture shows.
 
     Attributes:
-        width: upright, px.
-        height: upright, px.
+        width: of the upright pictures, px.
+        height: of the upright pictures, px.
         fps: frames a second, their mean where it varies.
         frames: how many; 0: unknown.
         seconds: how long; None: unknown.
@@ -134,7 +134,7 @@ class Video:
     Attributes:
         path: the file.
         quarters: turns counterclockwise of every picture, beyond what the file says.
-        notes: grows while frames are read: a stream that breaks, frames that cannot be decoded.
+        notes: grow while frames are read: a stream that breaks, frames that cannot be decoded.
     """
 
     path: Path
@@ -145,7 +145,7 @@ class Video:
         """Every frame in order of display. A stream that breaks half-way ends there, with a note.
 
         Raises:
-            InputError: not a video, no frames, too large.
+            InputError: no such file, not a file, it may not be read.
             FileFormatError: not a video, no frames, too large.
         """
         import av
@@ -168,7 +168,7 @@ class Video:
         if not count:
             raise FileFormatError(self.path, "expected a video, found no frame that can be read")
 
-    def facts(self) -> VideoFacts:
+    def info(self) -> VideoInfo:
         """Size, rate and length. Raises: as `frames`."""
         with closing(self.frames()) as frames:
             width, height = next(frames).size
@@ -176,7 +176,7 @@ class Video:
             stream = self._stream(container)
             seconds = container.duration / _PER_SECOND if container.duration else None
             count = _stated_frames(container, stream)
-            return VideoFacts(width, height, _rate(stream), count, seconds)
+            return VideoInfo(width, height, _rate(stream), count, seconds)
 
     def _note(self, note: str) -> None:
         if note not in self.notes:
@@ -187,7 +187,7 @@ class Video:
         return _open(self.path)
 
     def _stream(self, container: InputContainer) -> VideoStream:
-        stream = _pictures(container)
+        stream = _picture_stream(container)
         if stream is None:
             raise FileFormatError(self.path, "expected a video, found no picture track in it")
         stream.thread_type = "AUTO"
@@ -202,7 +202,7 @@ def is_video(path: Path) -> bool:
     """Whether the file begins like a video, whatever its name."""
     try:
         with _open(path) as container:
-            return _pictures(container) is not None
+            return _picture_stream(container) is not None
     except FileFormatError:
         return False
 
@@ -221,13 +221,13 @@ def _open(path: Path) -> InputContainer:
         raise FileFormatError(path, f"expected a video, found {found}") from None
 
 
-def _pictures(container: InputContainer) -> VideoStream | None:
-    """The first track of pictures that is not the cover of a piece of music."""
+def _picture_stream(container: InputContainer) -> VideoStream | None:
+    """The first video track that is not the cover of a piece of music."""
     return next((stream for stream in container.streams.video if not _is_cover(stream)), None)
 
 
 def _is_cover(stream: VideoStream) -> bool:
-    # Early versions of PyAV 14 do not tell.
+    # Early versions of PyAV 14 have no disposition.
     disposition = getattr(stream, "disposition", None)
     return disposition is not None and bool(disposition.value & _ATTACHED_PICTURE)
 
@@ -237,11 +237,11 @@ def _decoded(container: InputContainer, stream: VideoStream, quarters: int) -> I
     begin = (container.start_time or 0) / _PER_SECOND
     aspect = float(stream.sample_aspect_ratio or 1)
     size: tuple[int, int] | None = None
-    display = Display()
+    display = DisplayTransform()
     for count, raw in enumerate(container.decode(stream)):
         if size is None:
             size = max(1, round(raw.width * aspect)), raw.height
-            display = display_of(raw).turned(quarters)
+            display = display_transform(raw).turned(quarters)
         seconds = count / _rate(stream) if raw.time is None else raw.time - begin
         yield Frame(count, seconds, size, display, raw)
 
@@ -266,5 +266,5 @@ def _rate(stream: VideoStream) -> float:
 
 
 def _stated_frames(container: InputContainer, stream: VideoStream) -> int:
-    """As the file says, or as its stated length tells; 0 when there is none."""
+    """As the file states it, or by its stated length; 0 when there is neither."""
     return stream.frames or round((container.duration or 0) / _PER_SECOND * _rate(stream))

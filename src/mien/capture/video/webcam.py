@@ -11,33 +11,36 @@ from typing import Protocol
 import numpy as np
 
 from mien.arrays import Array, UInt8
-from mien.capture.images.photos import shrunk
+from mien.capture.images.photos import downscale
 from mien.capture.video.live_source import LiveFrame
 from mien.errors import InputError
 
-PATIENCE = 10.0
+TIMEOUT_S = 10.0
 """Seconds without a picture after which a camera has stopped; some take long to start."""
 _USUAL_RATE = 30.0
 
 
 class CaptureDevice(Protocol):
-    """What is used of cv2.VideoCapture."""
+    """The methods of cv2.VideoCapture that are used."""
 
-    def read(self) -> tuple[bool, UInt8[Array, "h w 3"]]: ...
+    def read(self) -> tuple[bool, UInt8[Array, "h w 3"]]:
+        """Whether there is a picture, and the picture, BGR."""
 
-    def get(self, prop: int, /) -> float: ...
+    def get(self, prop: int, /) -> float:
+        """A property such as the rate."""
 
-    def release(self) -> None: ...
+    def release(self) -> None:
+        """Release the device."""
 
 
 @dataclass(frozen=True)
-class _BgrShot:
+class _BgrPicture:
     """A picture as OpenCV delivers it."""
 
     bgr: UInt8[Array, "h w 3"]
 
     def pixels(self, *, max_side: int | None = None) -> UInt8[Array, "h w 3"]:
-        small = self.bgr if max_side is None else shrunk(self.bgr, max_side)
+        small = self.bgr if max_side is None else downscale(self.bgr, max_side)
         return np.ascontiguousarray(small[..., ::-1])
 
 
@@ -59,15 +62,15 @@ def open_camera(number: int) -> CaptureDevice:
 
 
 class Webcam:
-    """A camera that is being read by a thread, which keeps the newest picture only.
+    """A camera that is read by a thread, which keeps the newest picture only.
 
-    Whoever tracks slower than the camera films so misses pictures, but is never late.
+    A tracker that is slower than the camera misses pictures but never falls behind.
 
     Args:
         number: 0 is the system's first.
-        opened: gives the camera.
-        clock: seconds now.
-        patience: seconds.
+        open_device: opens the camera.
+        clock: gives the time in seconds.
+        timeout_s: seconds without a picture after which the camera counts as stopped.
 
     Raises:
         InputError: no such camera, or none that delivers pictures.
@@ -77,16 +80,16 @@ class Webcam:
         self,
         number: int,
         *,
-        opened: Callable[[int], CaptureDevice] = open_camera,
+        open_device: Callable[[int], CaptureDevice] = open_camera,
         clock: Callable[[], float] = time.monotonic,
-        patience: float = PATIENCE,
+        timeout_s: float = TIMEOUT_S,
     ) -> None:
-        self._name, self._clock, self._patience = f"camera {number}", clock, patience
+        self._name, self._clock, self._timeout_s = f"camera {number}", clock, timeout_s
         self.dropped = 0
         self.notes: list[str] = []
         self._newest: LiveFrame | None = None
         self._changed, self._ended = threading.Condition(), False
-        capture = opened(number)
+        capture = open_device(number)
         self.fps = _rate(capture)
         # A daemon, so that a driver that hangs cannot keep the program from ending.
         self._thread = threading.Thread(target=self._read, args=(capture,), daemon=True)
@@ -111,13 +114,13 @@ class Webcam:
         self.notes.append(f"{self._name} stopped delivering after {count} pictures")
 
     def close(self) -> None:
-        """Let go of the camera; a second time does nothing."""
+        """Release the camera; a second time does nothing."""
         with self._changed:
             self._ended = True
-        self._thread.join(self._patience)
+        self._thread.join(self._timeout_s)
 
     def _read(self, capture: CaptureDevice) -> None:
-        """What the thread does: all calls of the camera, for it is not safe to share."""
+        """The thread's loop. All calls of the camera are here, as it is not safe to share."""
         try:
             while not self._ended:
                 there, bgr = capture.read()
@@ -126,7 +129,7 @@ class Webcam:
                 taken = self._clock()
                 with self._changed:
                     index = self._last_index() + 1
-                    self._newest = LiveFrame(index, 0.0, taken, _BgrShot(bgr))
+                    self._newest = LiveFrame(index, 0.0, taken, _BgrPicture(bgr))
                     self._changed.notify_all()
         finally:
             capture.release()
@@ -141,7 +144,7 @@ class Webcam:
         """The newest picture once there is one after this; None: none comes any more."""
         with self._changed:
             self._changed.wait_for(
-                lambda: self._ended or self._last_index() > index, self._patience
+                lambda: self._ended or self._last_index() > index, self._timeout_s
             )
             return self._newest if self._last_index() > index else None
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from mien.arrays import Array, UInt8
 from mien.capture.images.colour import to_eight_bits
-from mien.capture.images.opening import opened_image
+from mien.capture.images.opening import open_image
 from mien.errors import FileFormatError, InputError
 from mien.io.files.atomic import atomic_file
 from mien.reading.files import is_missing
@@ -93,7 +93,7 @@ def load_image(path: str | Path) -> UInt8[Array, "h w 3"]:
         FileFormatError: missing, not a file, not such an image.
     """
     try:
-        with opened_image(path, [], kind="an image") as image:
+        with open_image(path, [], kind="an image") as image:
             image.load()
             # Pillow's own conversion of 16 bits cuts them off at 255.
             eight_bits = to_eight_bits(image, []) if image.mode.startswith("I") else image

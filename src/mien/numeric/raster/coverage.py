@@ -1,8 +1,8 @@
-"""Which triangle each sample shows, strip by strip: little memory, and nothing leaves the cache.
+"""The triangle at each sample, in strips of rows that fit the processor's cache.
 
 The tests at the edges are numeric.raster.rasterizer's, so that the same samples belong to the same
-triangles; what it writes for every pixel is worked out here for the triangles, once, and evaluated
-only where somebody looks.
+triangles. Barycentrics, which it writes for every pixel, are computed here from planes of each
+triangle, only where they are needed.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ class Coverage(NamedTuple):
     """Triangles on the grid of samples.
 
     Attributes:
-        points: (V, 2) samples' widths.
+        points: (V, 2) in units of a sample.
         triangles: (F, 3) vertex indices.
         boxes: (F, 4) first and last row, first and last column whose centres a triangle can hold;
             the first row lies after the last where it holds none or cannot be drawn.
-        planes: (F, 9) place of the first corner; 1 / z of the three; by how much the barycentrics
-            of the second and the third grow in x and in y.
+        planes: (F, 9) position of the first corner; 1 / z of the three; derivatives of the
+            barycentrics of the second and the third by x and y.
         starts: (2 strips + 1,) where each strip's fronts, and then its backs, start in order.
         order: triangles by strip and side, in their own order within each.
-        left: the columns that the triangles reach, widened to whole blocks.
-        width: the columns that the triangles reach, widened to whole blocks.
+        left: first column that the triangles reach, rounded to a block's.
+        width: number of columns that they reach, in whole blocks.
     """
 
     points: Float[Array, "v 2"]
@@ -61,8 +61,11 @@ def prepare_coverage(
     """Triangles ready to be drawn on width x height samples, STRIP rows at a time.
 
     Args:
-        points: (V, 2).
+        points: (V, 2) in units of a sample.
         depth: (V,) camera z; a triangle with a vertex at zero, behind it or not finite is skipped.
+        triangles: (F, 3) vertex indices.
+        width: in samples.
+        height: in samples.
     """
     count = len(triangles)
     boxes, planes = np.empty((count, 4), np.int32), np.empty((count, 9))
@@ -139,8 +142,10 @@ def cover_strip(coverage: Coverage, strip: int, ids: Array, nearest: Array) -> t
     """Write each sample's triangle, -1 for none; return the first column reached and the end.
 
     Args:
+        coverage: of prepare_coverage.
+        strip: its index from the top.
         ids: (STRIP, coverage.width) int32, from column coverage.left on.
-        nearest: (STRIP, coverage.width) float32 to work with: 1 / z.
+        nearest: (STRIP, coverage.width) float32 working memory: 1 / z.
     """
     ids[:] = -1
     nearest[:] = 0.0
@@ -153,15 +158,15 @@ def cover_strip(coverage: Coverage, strip: int, ids: Array, nearest: Array) -> t
         first = min(first, coverage.boxes[t, 2] - coverage.left)
         last = max(last, coverage.boxes[t, 3] - coverage.left)
         if n == backs:
-            _keep_farthest(nearest, farthest)
-        # Nearly all backs lie behind fronts: they are left out without looking at samples.
+            _farthest_of_blocks(nearest, farthest)
+        # Nearly all backs lie behind fronts: they are culled by blocks of samples.
         if n < backs or not _is_hidden(coverage, t, origin, farthest):
             _cover(coverage, t, origin, ids, nearest)
     return first, last + 1
 
 
 @njit(cache=True, nogil=True)
-def _keep_farthest(nearest: Array, farthest: Array) -> None:
+def _farthest_of_blocks(nearest: Array, farthest: Array) -> None:
     farthest[:] = np.inf
     for line in range(nearest.shape[0]):
         for block in range(farthest.shape[1]):
@@ -192,8 +197,13 @@ def _clip_columns(
     """Of the columns from left to right, the first and the last inside an edge.
 
     Args:
+        a: slope of the edge's function a (x - x0) + rest along the row.
+        x0: as there.
+        rest: as there.
         least: of the values inside (edge_line).
         shift: rest / a; the edge crosses the row at x0 - shift.
+        left: first column.
+        right: last column.
     """
     if a == 0.0:
         return (left, right) if rest >= least else (left, left - 1)
@@ -246,7 +256,7 @@ def _cover(coverage: Coverage, t: int, origin: int, ids: Array, nearest: Array) 
 
 @njit(inline="always")
 def barycentrics_at(planes: Array, t: int, x: float, y: float) -> tuple[float, float, float]:
-    """Perspective-correct, never negative, summing to 1: a place past an edge comes to the edge."""
+    """Perspective-correct, clamped to the triangle, summing to 1."""
     dx, dy = x - planes[t, X], y - planes[t, Y]
     second = min(max(planes[t, X1] * dx + planes[t, Y1] * dy, 0.0), 1.0)
     third = min(max(planes[t, X2] * dx + planes[t, Y2] * dy, 0.0), 1.0)

@@ -1,4 +1,4 @@
-"""Piecewise-affine correspondences: which pixels a triangle covers, and where else they lie."""
+"""Piecewise-affine warps: the pixels of each triangle, and their places in other pictures."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ __all__ = [
 ]
 
 SUBPIXELS = 1024
-"""Corners are drawn at whole parts of a pixel: sums are exact, and no pixel is lost or shared."""
+"""Parts of a pixel at which corners are drawn: sums are exact, no pixel is lost or shared."""
 
 _FARTHEST = 1 << 18
-"""px. Corners farther off are drawn there, so that products of differences fit 64 bits."""
+"""px. Corners farther off are clamped to it, so that products of differences fit 64 bits."""
 
 
 def to_subpixels(points: Float[Array, "n 2"]) -> Int[Array, "n 2"]:
@@ -35,10 +35,10 @@ def to_subpixels(points: Float[Array, "n 2"]) -> Int[Array, "n 2"]:
 def orient_triangles(
     triangles: Int[Array, "t 3"], points: Float[Array, "n 2"]
 ) -> Int[Array, "t 3"]:
-    """The triangles, all turned the way around that is drawn where points lie as given.
+    """The triangles, all of the orientation that is drawn, for points as given.
 
-    Points may be moved then: what folds over is not drawn. While the mesh's border stays, its
-    inside stays covered.
+    Where the points are moved later, triangles that fold over are not drawn. While the mesh's
+    border stays, its inside stays covered.
 
     Raises:
         InputError: shapes, NaN, an index out of range, a triangle without area.
@@ -56,7 +56,7 @@ def orient_triangles(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def affine_maps(corners: Array, triangles: Array, pictures: Array) -> Array:
-    """Where in other pictures the pixels of each triangle lie.
+    """Affine maps from the pixels of each triangle to other pictures.
 
     Args:
         corners: (n, 2) in parts of a pixel, of the picture that is drawn.
@@ -94,7 +94,7 @@ def affine_maps(corners: Array, triangles: Array, pictures: Array) -> Array:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def row_extents(corners: Array, triangles: Array) -> tuple[Array, Array]:
-    """First row and end of each triangle (T,), in the picture or not; none where folded over."""
+    """(T,) first row and end of each triangle, in the picture or not; none if folded over."""
     tops, ends = np.zeros(len(triangles), np.int64), np.zeros(len(triangles), np.int64)
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -117,15 +117,18 @@ def scanline_spans(
     starts: Array,
     spans: Array,
 ) -> int:
-    """Cut a row of a picture where triangles change.
+    """Spans of triangles along a row of a picture.
 
-    Where several cover a pixel, as beside a fold, the one that begins first has it.
+    Where several cover a pixel, as beside a fold, the one whose span begins first has it.
 
     Args:
+        corners: (n, 2) in parts of a pixel.
+        triangles: (T, 3) oriented by `orient_triangles`.
         tops: of `row_extents`.
         ends: of `row_extents`.
+        row: of the picture.
         width: of the picture.
-        found: (T, 3) memory to work in.
+        found: (T, 3) working memory.
         starts: (2 T + 2,) filled with the spans' first columns and, after them, the width.
         spans: (2 T + 1,) filled with their triangles, -1 where there is none.
 
@@ -136,7 +139,7 @@ def scanline_spans(
     for t in range(len(triangles)):
         if tops[t] <= row < ends[t]:
             a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            first, end = _row_span(corners, a, b, c, row, width)
+            first, end = _triangle_span(corners, a, b, c, row, width)
             if first < end:
                 n = size
                 while n > 0 and found[n - 1, 0] > first:
@@ -161,21 +164,23 @@ def scanline_spans(
 
 
 @njit(inline="always")
-def _row_span(corners: Array, a: int, b: int, c: int, row: int, width: int) -> tuple[int, int]:
+def _triangle_span(corners: Array, a: int, b: int, c: int, row: int, width: int) -> tuple[int, int]:
     """First column and end of a facing triangle's pixels in a row of a picture.
 
     A pixel belongs to the triangle that holds its centre; on an edge, to the one below it or right
     of it (top-left rule). So triangles that share edges leave no gap and do not overlap.
     """
-    first, end = _cut(corners, a, b, row, 0, width)
-    first, end = _cut(corners, b, c, row, first, end)
-    first, end = _cut(corners, c, a, row, first, end)
+    first, end = _clip_to_edge(corners, a, b, row, 0, width)
+    first, end = _clip_to_edge(corners, b, c, row, first, end)
+    first, end = _clip_to_edge(corners, c, a, row, first, end)
     return first, end
 
 
 @njit(inline="always")
-def _cut(corners: Array, a: int, b: int, row: int, first: int, end: int) -> tuple[int, int]:
-    """What of a row lies on the inner side of the edge from a to b."""
+def _clip_to_edge(
+    corners: Array, a: int, b: int, row: int, first: int, end: int
+) -> tuple[int, int]:
+    """The part of a row from first to end on the inner side of the edge from a to b."""
     dx, dy = corners[b, 0] - corners[a, 0], corners[b, 1] - corners[a, 1]
     below = row * SUBPIXELS + SUBPIXELS // 2 - corners[a, 1]
     right = SUBPIXELS // 2 - corners[a, 0]

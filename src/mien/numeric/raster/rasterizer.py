@@ -1,4 +1,4 @@
-"""Which triangle every pixel shows, and where in it.
+"""Rasterization: the triangle at every pixel, its barycentrics and its depth.
 
 Pixel (column, row) is sampled at its centre (column + 0.5, row + 0.5). Edges are tested with the
 same arithmetic from both sides and the top-left rule, so that a point on an edge that two
@@ -21,7 +21,7 @@ _ABOVE_ZERO = float(np.nextafter(0.0, 1.0))
 
 @dataclass(frozen=True)
 class Raster:
-    """What a camera sees of a mesh.
+    """A mesh rasterized by a camera.
 
     Attributes:
         triangle_ids: (H, W) int32, -1 where there is no triangle.
@@ -56,7 +56,7 @@ def rasterize(
         triangles: (F, 3) vertex indices, counter-clockwise as the camera sees their front.
         width: px.
         height: px.
-        cull: leave out triangles seen from behind.
+        cull: leave out back faces.
 
     Raises:
         InputError: shapes, sizes, an index out of range.
@@ -78,7 +78,7 @@ def rasterize(
 
 
 def empty_raster(width: int, height: int) -> Raster:
-    """Memory that rasterize_rows is the first to touch: that takes long, but it runs in threads."""
+    """A raster whose memory rasterize_rows is the first to touch, in its threads."""
     shape = (height, width)
     ids, depth = np.empty(shape, np.int32), np.empty(shape, np.float32)
     return Raster(ids, np.empty((*shape, 3), np.float32), depth)
@@ -130,10 +130,10 @@ def edge_line(vertices_px: Array, i: int, j: int) -> tuple[float, float, float, 
 
 @njit(inline="always")
 def _bounds(a: float) -> tuple[float, float, float]:
-    """1 / a, and what leads from an edge's crossing of a row to the first and last column inside.
+    """1 / a, and offsets from an edge's crossing of a row to the first and last column inside.
 
-    Rounding makes them miss none, though they may hold one too many. An edge along the rows bounds
-    no columns.
+    With rounding the columns may include one too many, but miss none. An edge along the rows
+    bounds no columns.
     """
     if abs(a) < 1e-12:
         return 0.0, -np.inf, np.inf
@@ -155,8 +155,15 @@ def _fill_triangle(
     """Write triangle t where it is the nearest so far.
 
     Args:
+        vertices_px: as for rasterize_rows, like the other arrays.
+        depth: as there.
+        triangles: as there.
+        t: index of the triangle.
         flip: its corners go counter-clockwise on the screen, as those of a front do.
         box: first and last row, first and last column that it can reach.
+        ids: as there.
+        barycentrics: as there.
+        nearest: as there.
     """
     second, third = (2, 1) if flip else (1, 2)
     i, j, k = triangles[t, 0], triangles[t, second], triangles[t, third]
@@ -178,7 +185,7 @@ def _fill_triangle(
         for col in range(int(np.ceil(low)), int(np.floor(high)) + 1):
             x = col + 0.5
             e0, e1, e2 = a0 * (x - x0) + r0, a1 * (x - x1) + r1, a2 * (x - x2) + r2
-            # One branch: those that are hard to foretell cost more than the tests.
+            # One branch: a mispredicted one costs more than the tests.
             if not ((e0 >= least0) & (e1 >= least1) & (e2 >= least2)):
                 continue
             # 1/z is linear on the screen.

@@ -12,8 +12,9 @@ __all__ = ["AndersonAcceleration"]
 class AndersonAcceleration:
     """Proposes the next iterate from the last few pairs (x, g(x)).
 
-    It chooses the combination of past iterates whose combined step g(x) - x is shortest and takes
-    the same combination of the g(x). The caller judges the proposal; `forget` after a refusal.
+    It takes the combination of past iterates whose combined residual g(x) - x is shortest, and
+    returns the same combination of the g(x). The caller may refuse the proposal, and calls `reset`
+    then.
 
     Args:
         depth: how many past differences are used.
@@ -25,25 +26,25 @@ class AndersonAcceleration:
 
     def __init__(self, depth: int, *, regularization: float = 1e-10) -> None:
         self.depth, self.regularization = depth, regularization
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
-        """Drops the history."""
+    def reset(self) -> None:
+        """Drop the history."""
         self._iterates: list[Array] = []
         self._images: list[Array] = []
 
     def propose(self, iterate: Float[Array, " n"], image: Float[Array, " n"]) -> Float[Array, " n"]:
-        """The next iterate, given the latest one and its image g(x)."""
+        """The next iterate, from the latest one x and its image g(x)."""
         self._iterates = [*self._iterates[-self.depth :], iterate]
         self._images = [*self._images[-self.depth :], image]
         images = np.stack(self._images, axis=1)
-        steps = images - np.stack(self._iterates, axis=1)
-        if steps.shape[1] == 1:
+        residuals = images - np.stack(self._iterates, axis=1)
+        if residuals.shape[1] == 1:
             return image
-        change = np.diff(steps, axis=1)
+        change = np.diff(residuals, axis=1)
         scale = np.linalg.norm(change, axis=0)
         change = change / np.where(scale > 0, scale, 1.0)
         normal = change.T @ change + self.regularization * np.eye(change.shape[1])
-        mixing = np.linalg.solve(normal, change.T @ steps[:, -1])
+        mixing = np.linalg.solve(normal, change.T @ residuals[:, -1])
         mixing = mixing / np.where(scale > 0, scale, 1.0)
         return image - np.diff(images, axis=1) @ mixing

@@ -1,4 +1,4 @@
-"""Levenberg-Marquardt: the loop alone; the problem brings its linearization and its steps."""
+"""Levenberg-Marquardt: the loop; the problem supplies its cost, linearization and update."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _MIN_DAMPING, _MAX_DAMPING = 1e-12, 1e12
 
 @dataclass(frozen=True)
 class LevenbergMarquardtResult(Generic[X]):
-    """Where the iteration ended.
+    """The result of the iteration.
 
     Attributes:
-        x: the unknowns.
+        x: the parameters.
         cost: at x.
         iterations: linearizations made.
         converged: False where the limit on iterations came first.
@@ -43,16 +43,19 @@ def minimize_lm(
     tolerance: float = 1e-10,
     max_failures: int | None = None,
 ) -> LevenbergMarquardtResult[X]:
-    """Goes downhill from x.
+    """A local minimum of the cost, from x.
 
     Args:
+        x: initial parameters.
         cost: half the sum of squares (or its robust counterpart).
         linearize: at x, gives the function that, for a damping relative to the normal matrix's
             diagonal, solves for a step and predicts by how much the cost falls.
-        move: x after a step; where rotations stay rotations.
-        tolerance: relative fall of the cost, predicted and found, at which it has converged.
-        max_failures: steps in a row that may fail before it counts as converged, for those who must
-            be done in time; by default as many as it takes.
+        move: x after a step (rotations stay rotations).
+        damping: the first one.
+        max_iterations: linearizations at most.
+        tolerance: predicted relative fall of the cost at which it has converged.
+        max_failures: rejected steps in a row after which it counts as converged, for callers with
+            little time; None sets no limit.
 
     Source:
         Nielsen, Damping parameter in Marquardt's method, 1999 (how damping follows the gain).

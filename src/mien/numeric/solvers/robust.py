@@ -1,7 +1,7 @@
 """Robust losses of squared, normalised residuals: cost and the weight of the next iteration.
 
 A loss takes u = |residual|^2 / scale^2 and returns rho(u) and rho'(u) with rho(u) ~ u for small
-u. Weighted least squares with weights rho' goes downhill on the sum of rho.
+u. Iteratively reweighted least squares with weights rho' minimises the sum of rho.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ def loss_named(name: str) -> Loss:
 
 
 def robust_sigma(distances: Float[Array, " n"], dimensions: int = 2) -> float:
-    """Standard deviation per axis of Gaussian residuals from the median of their lengths.
+    """Standard deviation per axis of Gaussian residuals, from the median of their lengths.
 
     Args:
-        distances: (N,) lengths of residual vectors; up to half may be anything.
+        distances: (N,) lengths of residual vectors; up to half may be outliers.
         dimensions: of a residual vector, 1 to 3.
     """
     median_of_unit = {1: 0.67449, 2: 1.17741, 3: 1.53817}[dimensions]

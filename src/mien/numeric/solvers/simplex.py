@@ -1,4 +1,4 @@
-"""The mixture of columns that comes nearest to a target."""
+"""Least squares over the unit simplex: coefficients that are not negative and sum to 1."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mien.errors import EstimationError, InputError
 __all__ = ["simplex_least_squares", "simplex_quadratic_program"]
 
 _ACCURACIES = (1e-12, 1e-8, 1e-6)
-"""Of a cost whose greatest coefficient is 2: the best that rounding lets the solver reach."""
+"""Of a cost whose greatest coefficient is 2, tried in turn: rounding limits what is reached."""
 
 
 def simplex_least_squares(
@@ -22,18 +22,18 @@ def simplex_least_squares(
     slack: float = 0.0,
     penalty: Float[Array, " m"] | None = None,
 ) -> Float[Array, " m"]:
-    """Shares c that minimise |columns c - target|^2 + penalty . c, found by an interior point.
+    """Coefficients c that minimise |columns c - target|^2 + penalty . c, by an interior point.
 
-    Where several mixtures are equally near, as with columns that are the same, one of them.
+    Where several are optimal, as with columns that are the same, one of them.
 
     Args:
-        columns: (d, m) what is mixed.
+        columns: (d, m) vectors that are combined.
         target: (d,).
-        slack: how far below 0 a share may go; above 0, the mixture may leave the convex hull.
-        penalty: (m,) cost of a column's share, in the square of the target's unit.
+        slack: how far below 0 a coefficient may go; above 0, the result may leave the convex hull.
+        penalty: (m,) cost of a column's coefficient, in the square of the target's unit.
 
     Returns:
-        (m,) shares that sum to 1, none below -slack.
+        (m,) coefficients that sum to 1, none below -slack.
 
     Raises:
         InputError: shapes, NaN, no column, a slack below 0.
@@ -50,42 +50,47 @@ def simplex_least_squares(
     if not (np.isfinite(slack) and slack >= 0):
         raise InputError("slack", "a number of at least 0", slack)
     costs = np.zeros(count) if penalty is None else check_array("penalty", penalty, (count,))
-    # Shares sum to 1: the target taken from each column leaves the cost as it is, with smaller
-    # numbers than eq. (5)'s and none linear.
-    apart = columns - target[:, None]
-    return simplex_quadratic_program(apart.T @ apart, slack=slack, penalty=costs)
+    # As coefficients sum to 1, the cost is c^T G c with the Gram matrix G of the residuals below:
+    # smaller numbers than eq. (5)'s, and no linear term.
+    residuals = columns - target[:, None]
+    return simplex_quadratic_program(residuals.T @ residuals, slack=slack, penalty=costs)
 
 
 def simplex_quadratic_program(
-    products: Float[Array, "m m"], *, slack: float = 0.0, penalty: Float[Array, " m"]
+    gram: Float[Array, "m m"], *, slack: float = 0.0, penalty: Float[Array, " m"]
 ) -> Float[Array, " m"]:
-    """The same from the columns' products with each other, when the target is taken from each.
+    """Coefficients c on the simplex that minimise c^T gram c + penalty . c.
 
-    Unlike `simplex_least_squares` it looks at nothing: for many small problems, each of which takes
-    20 us, that would be most of the time.
+    It checks nothing: for many small problems, each of which takes 20 us, checks would be most of
+    the time.
+
+    Args:
+        gram: (m, m) products of the columns less the target with each other.
+        slack: as for `simplex_least_squares`.
+        penalty: (m,) as there.
 
     Raises:
         EstimationError: as there.
     """
-    scale = max(float(products.diagonal().max()), float(np.abs(penalty).max()))
+    scale = max(float(gram.diagonal().max()), float(np.abs(penalty).max()))
     if scale == 0.0:
-        return frozen(np.full(len(products), 1.0 / len(products)))
+        return frozen(np.full(len(gram), 1.0 / len(gram)))
     if not np.isfinite(scale):
         raise EstimationError("columns and target are too large to be squared")
-    return frozen(_solved(2.0 * products / scale, penalty / scale, slack))
+    return frozen(_solved(2.0 * gram / scale, penalty / scale, slack))
 
 
 def _solved(quadratic: Array, linear: Array, slack: float) -> Float[Array, " m"]:
     count = len(linear)
-    shares = _interior(quadratic, linear, slack)
-    # An interior point keeps off the bounds by its accuracy.
-    above = np.maximum(shares + slack, 0.0)
+    coefficients = _interior_point(quadratic, linear, slack)
+    # An interior point stays off the bounds by its accuracy.
+    above = np.maximum(coefficients + slack, 0.0)
     above[above < 1e-9] = 0.0
     return above * ((1.0 + count * slack) / above.sum()) - slack
 
 
-def _interior(quadratic: Array, linear: Array, slack: float) -> Float[Array, " m"]:
-    """As accurate as it can be had: columns that are the same, and great costs, cost digits."""
+def _interior_point(quadratic: Array, linear: Array, slack: float) -> Float[Array, " m"]:
+    """The solution at the best accuracy that is reached: equal columns and large costs lower it."""
     import piqp
 
     count = len(linear)
@@ -107,5 +112,5 @@ def _interior(quadratic: Array, linear: Array, slack: float) -> Float[Array, " m
 
 @cache
 def _sum_of_one(count: int) -> tuple[Array, Array]:
-    """The equation that shares fulfil, its left side and its right."""
+    """The constraint sum(c) = 1: its matrix and its right side."""
     return frozen(np.ones((1, count), order="F")), frozen(np.ones(1))

@@ -13,7 +13,7 @@ import numpy as np
 
 from mien.arrays import Array, UInt8
 from mien.capture.video.frames_ahead import frames_ahead
-from mien.capture.video.video import Video, VideoFacts
+from mien.capture.video.video import Video, VideoInfo
 from mien.errors import FileFormatError
 from mien.head import Head
 from mien.io.tracks.track_journal import Journal, journal_of, load_journal
@@ -48,7 +48,7 @@ class TrackRun:
     """
 
     clip: Video
-    facts: VideoFacts
+    facts: VideoInfo
     ready: ReadyHead
     focal_px: float
     max_side: int

@@ -23,8 +23,9 @@ from mien.reconstruction.expression.unit_fit import Explained, explain
 from mien.reconstruction.features import gather_features
 from mien.reconstruction.landmark_fit import focal_priors, residuals_of
 from mien.reconstruction.observations import SurfaceObservations, reproject
-from mien.reconstruction.outliers import PhotoFit, find_misfit, judge_marks, typical_misfits
+from mien.reconstruction.outliers import find_misfit, judge_marks, typical_misfits
 from mien.reconstruction.resection import LEAST_FEATURES, place_cameras
+from mien.reconstruction.result import ExpressionFit, PhotoFit
 from mien.reconstruction.shape.skin import move_skin
 
 FOLLOWED_MM = (1.6, 0.8)
@@ -39,27 +40,6 @@ _STEADY = ("eyeLook", "tongueOut")
 """Units that landmarks do not tell: gaze has the irises, the tongue has nothing."""
 _CLOSED = 0.5
 """Weight of a blink at which an iris cannot be seen any more."""
-
-
-@dataclass(frozen=True)
-class ExpressionFit:
-    """An expression in the neutral head's frame.
-
-    Attributes:
-        vertices: (V, 3) mm, head space, eyeballs as in neutral.
-        units: (52,) weights of the face units that explain it.
-        gaze: (2, 2) rad, yaw and pitch of the left and the right eye beyond where they look in
-            neutral.
-        photos: by photo name, those that fit.
-        left_out: why, by photo name, the others did not.
-    """
-
-    vertices: Float[Array, "v 3"]
-    units: Float[Array, " 52"]
-    gaze: Float[Array, "2 2"]
-    photos: dict[str, PhotoFit]
-    left_out: dict[str, str]
-    notes: tuple[str, ...] = ()
 
 
 def fit_expression(
@@ -142,7 +122,8 @@ def _fit(views: Sequence[CapturedView], known: KnownHead, tell: StepProgress) ->
         for k, (view, camera) in enumerate(zip(views, found.cameras, strict=True))
     }
     notes = tuple(STRANGE_SKIN.format(views[k].photo.name) for k in strange)
-    fit = ExpressionFit(vertices, found.weights, _gaze(views, found, known), photos, {}, notes)
+    gaze = _gaze(views, found, known)
+    fit = ExpressionFit(vertices, photos, {}, notes, units=found.weights, gaze=gaze)
     return _Found(fit, typical_misfits(residuals, sigma_px))
 
 

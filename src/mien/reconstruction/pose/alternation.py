@@ -83,7 +83,7 @@ def alternate(
         moved, swept, cost = _sweep(poses, points, image, weights, anchor, loss, sigma_px)
         if poses is not plain and cost > costs[-1]:
             assert accelerate is not None
-            accelerate.forget()
+            accelerate.reset()
             poses = plain
             continue
         costs.append(cost)

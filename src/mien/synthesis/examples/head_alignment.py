@@ -39,4 +39,4 @@ def align_to_neutral(
     points = check_array("points", points, (*np.shape(points)[:-2], *neutral.shape))
     used = slice(None) if subset is None else subset
     motion = estimate_planar_similarity(neutral[used], points[..., used, :])
-    return motion.undo(points), motion
+    return motion.inverse(points), motion

@@ -7,7 +7,7 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8, check_image
 from mien.assets.feature_points import FeatureLayout
 from mien.capture.faces.detector import LandmarkDetector
-from mien.capture.images.photos import shrunk
+from mien.capture.images.photos import downscale
 from mien.errors import InputError
 from mien.synthesis.examples.brow_correction import correct_brows
 
@@ -54,7 +54,7 @@ def averaged_points(
         raise InputError("landmarks", "a face with a width", "none")
     # Reduced before it is rotated, as the warp only interpolates between pixels.
     factor = min(_SIDE / (_WIDTHS * width), 1.0)
-    small = shrunk(pixels, max(round(factor * max(pixels.shape[:2])), 1))
+    small = downscale(pixels, max(round(factor * max(pixels.shape[:2])), 1))
     # By axis: sides are whole numbers of pixels.
     scale = np.array(small.shape[1::-1]) / pixels.shape[1::-1]
     detections = [

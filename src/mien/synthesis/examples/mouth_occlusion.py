@@ -6,7 +6,7 @@ import numpy as np
 
 from mien.arrays import Array, Bool, Float, UInt8
 from mien.assets.feature_points import FeatureLayout
-from mien.capture.images.photos import shrunk
+from mien.capture.images.photos import downscale
 from mien.numeric.raster.rasterizer import rasterize
 from mien.synthesis.composition.example_warping import warp_to_raster
 
@@ -69,7 +69,7 @@ class LipContrast:
         if not crop.size:
             self._contrasts.append(np.full((len(self._quarters), 3), np.nan))
             return
-        small = shrunk(crop, 2 * _WIDTH)
+        small = downscale(crop, 2 * _WIDTH)
         scale = np.array(small.shape[1::-1]) / crop.shape[1::-1]
         triangles = self._layout.face_triangles
         face = warp_to_raster(small, (points - low) * scale, triangles, self._raster)

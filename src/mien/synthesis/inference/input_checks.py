@@ -147,7 +147,7 @@ def _alignment_rms(source: Float[Array, "k 2"], target: Float[Array, "k 2"]) -> 
     """Root of the mean squared distance after the best motion, in the source's px."""
     if len(source) < 2:
         raise InputError("known", "at least 2 points", len(source))
-    residual = estimate_planar_similarity(source, target).undo(target) - source
+    residual = estimate_planar_similarity(source, target).inverse(target) - source
     return float(np.sqrt((residual**2).sum(axis=1).mean()))
 
 

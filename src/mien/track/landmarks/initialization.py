@@ -9,7 +9,12 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
-from mien.capture.faces.detector import LandmarkDetector, closer, faces_around, same_place
+from mien.capture.faces.detector import (
+    LandmarkDetector,
+    detect_around,
+    is_same_face,
+    refine_small_face,
+)
 from mien.capture.faces.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace
 from mien.errors import EstimationError
 from mien.head import Head
@@ -94,28 +99,30 @@ class Starter:
         size = (pixels.shape[1], pixels.shape[0])
         x, y = focal_px * t_cam_head[:2] / t_cam_head[2] + np.array(size) / 2
         reach = focal_px * _REACH_MM / t_cam_head[2]
-        faces = self._detector.all_fast(pixels)
+        faces = self._detector.detect_all_fast(pixels)
         near = [face for face in faces if _off(face, (x, y)) < face.width]
         # A small one may not be seen in the whole picture.
-        near = near or faces_around(self._detector, pixels, (x, y), reach)
+        near = near or detect_around(self._detector, pixels, (x, y), reach)
         if not near:
             return None
         face = min(near, key=lambda face: _off(face, (x, y)))
-        found = self.fit(closer(self._detector, pixels, face), size=size, focal_px=focal_px)
+        found = self.fit(
+            refine_small_face(self._detector, pixels, face), size=size, focal_px=focal_px
+        )
         return found and found.state
 
     def look(self, pixels: UInt8[Array, "h w 3"]) -> list[DetectedFace]:
         """Every face, the largest first; those that are small are looked at twice."""
-        faces = self._detector.all_fast(pixels)
-        return [closer(self._detector, pixels, face) for face in faces]
+        faces = self._detector.detect_all_fast(pixels)
+        return [refine_small_face(self._detector, pixels, face) for face in faces]
 
     def look_closely(self, pixels: UInt8[Array, "h w 3"]) -> list[DetectedFace]:
         """Those faces that are too small to be found in the whole picture, 70 ms."""
-        large = self._detector.all_fast(pixels)
+        large = self._detector.detect_all_fast(pixels)
         return [
-            closer(self._detector, pixels, face)
-            for face in self._detector.all_in_parts(pixels)
-            if not any(same_place(face, other) for other in large)
+            refine_small_face(self._detector, pixels, face)
+            for face in self._detector.detect_in_tiles(pixels)
+            if not any(is_same_face(face, other) for other in large)
         ]
 
     def fit(self, face: DetectedFace, *, size: tuple[int, int], focal_px: float) -> Found | None:

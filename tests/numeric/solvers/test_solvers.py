@@ -28,7 +28,7 @@ def test_anderson_without_history_is_the_plain_iteration(rng):
     x, image = rng.normal(size=(2, 4))
     np.testing.assert_array_equal(method.propose(x, image), image)
     method.propose(image, image / 2)
-    method.forget()
+    method.reset()
     np.testing.assert_array_equal(method.propose(x, image), image)
 
 
