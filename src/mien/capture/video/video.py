@@ -79,7 +79,7 @@ class Frame:
 
     @property
     def hdr(self) -> str:
-        """ "HLG" or "PQ", if it is coded so for a brighter range than sRGB's; else ""."""
+        """The HDR transfer characteristic, "HLG" or "PQ"; "" for a picture that is not HDR."""
         return HDR.get(self.raw.color_trc, "")
 
     @property
