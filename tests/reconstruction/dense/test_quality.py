@@ -23,7 +23,7 @@ def test_nothing_to_say_of_good_photos() -> None:
 
 def test_a_photo_that_shares_too_little() -> None:
     (note,) = quality(shared=np.array([500, 12, 400, 300])).notes(NAMES)
-    assert note.startswith("b.png: shares too little skin with the other photos (12 points)")
+    assert note.startswith("b.png: shares too little skin with the other photos (12 places)")
 
 
 def test_regions_that_differ_are_named() -> None:
