@@ -18,7 +18,7 @@ from mien.pipelines.build import Build, build_head
 from mien.render.morph import MorphRenderer
 from mien.render.picture import HeadRenderer
 from mien.render.shade import rasterize_mesh, shown_parts
-from mien.rig.regions import MASKS, default_masks
+from mien.rig.regions import MASK_NAMES, default_masks
 from mien.rig.rig import Rig
 from mien.rig.state import FaceState, PosedFace
 
@@ -127,7 +127,7 @@ def pairs(mask: Array) -> tuple[Array, Array]:
 
 def steps(filmed: Filmed, face: PosedFace, camera: Camera) -> Steps:
     masks = default_masks(GENERIC)
-    half = [masks[name] for name in MASKS]
+    half = [masks[name] for name in MASK_NAMES]
     whole = [half[2 * k] + half[2 * k + 1] for k in range(3)]
     covered, shares = filmed.seen(face, np.column_stack([*whole, GENERIC.regions["face"]]), camera)
     mixed = ((shares[..., :3] > 0.05) & (shares[..., :3] < 0.95)).any(axis=2)

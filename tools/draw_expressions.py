@@ -21,7 +21,7 @@ from mien.io.head.head_folder import load_head
 from mien.render.orbit import orbit_camera
 from mien.render.picture import HeadRenderer
 from mien.render.shade import render
-from mien.rig.regions import MASKS, default_masks
+from mien.rig.regions import MASK_NAMES, default_masks
 from mien.rig.state import FACE, FaceState
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
@@ -83,8 +83,10 @@ def _regions() -> list[Array]:
     generic = load_generic_head()
     masks = default_masks(generic)
     colours = np.array([*_COLOURS, _COLOURS_LAST], float)
-    mixed = sum(masks[name][:, None] * colour for name, colour in zip(MASKS, colours, strict=True))
-    rest = 1 - np.sum([masks[name] for name in MASKS], axis=0)
+    mixed = sum(
+        masks[name][:, None] * colour for name, colour in zip(MASK_NAMES, colours, strict=True)
+    )
+    rest = 1 - np.sum([masks[name] for name in MASK_NAMES], axis=0)
     painted = mixed + rest[:, None] * 150.0
     vertices = generic.mesh.vertices
     return [

@@ -19,11 +19,11 @@ from mien.assets.generic import GenericHead, load_generic_head
 from mien.camera import Camera
 from mien.io.head.head_folder import load_head
 from mien.render.shade import rasterize_mesh
-from mien.rig.contacts.contacts import Contacts, Mechanics, fit_units
+from mien.rig.deformer import Contacts, FaceDeformer, fit_units
 from mien.rig.gaze import SIDES
 from mien.rig.unit_transfer import transfer_units
 
-_LEAST_MM = 0.1
+_MIN_MM = 0.1
 _VIEWS = [(yaw, pitch) for yaw in (-30, 0, 30) for pitch in (-20, 0, 20)]
 _PX_PER_MM = 30.0
 _DISTANCE_MM = 700.0
@@ -34,16 +34,16 @@ def main(folder: str | None = None) -> None:
     generic = load_generic_head()
     neutral = np.array((load_head(Path(folder)) if folder else generic).mesh.vertices)
     transferred, units = transfer_units(generic, neutral), fit_units(generic, neutral)
-    mechanics = Mechanics.of(generic, neutral, units)
-    _print_depths(generic, neutral, transferred, units, mechanics)
-    _print_closed_eyes(generic, neutral, units, mechanics)
-    _print_times(generic, neutral, units, mechanics)
+    deformer = FaceDeformer.of(generic, neutral, units)
+    _print_depths(generic, neutral, transferred, units, deformer)
+    _print_closed_eyes(generic, neutral, units, deformer)
+    _print_times(generic, neutral, units, deformer)
 
 
 def lid_depth(contacts: Contacts, vertices: Float[Array, "v 3"]) -> float:
     """mm that the deepest vertex of a lid's front is in the eyeball's clearance."""
     depths = [
-        float((lids.least - lids.places(vertices)[:, 2]).max()) * lids.eyeball.radius
+        float((lids.min_radius - lids.spherical(vertices)[:, 2]).max()) * lids.eyeball.radius
         for lids in contacts.lids
     ]
     return max(*depths, 0.0)
@@ -59,9 +59,9 @@ def _print_depths(
     neutral: Float[Array, "v 3"],
     transferred: Float[Array, "52 v 3"],
     units: Float[Array, "52 v 3"],
-    mechanics: Mechanics,
+    deformer: FaceDeformer,
 ) -> None:
-    contacts = mechanics.contacts
+    contacts = deformer.contacts
     jaw = generic.unit_names.index("jawOpen")
     for part, depth in (("lids", lid_depth), ("lips", lip_depth)):
         print(f"\n| {part}, at weight 1 | transferred | corrected | half | live |")
@@ -69,10 +69,10 @@ def _print_depths(
         for index, name in enumerate(generic.unit_names):
             chosen = [index, jaw] if name == "mouthClose" else [index]
             raw, sound = (neutral + table[chosen].sum(axis=0) for table in (transferred, units))
-            live = mechanics.applied(neutral, np.eye(len(units))[chosen].sum(axis=0))
+            live = deformer.deform(neutral, np.eye(len(units))[chosen].sum(axis=0))
             states = [raw, sound, (neutral + sound) / 2, live]
             found = [depth(contacts, state) for state in states]
-            if max(found) > _LEAST_MM:
+            if max(found) > _MIN_MM:
                 title = " + ".join(generic.unit_names[n] for n in chosen)
                 print(f"| {title} |", " | ".join(f"{d:.2f}" for d in found), "|")
 
@@ -81,7 +81,7 @@ def _print_closed_eyes(
     generic: GenericHead,
     neutral: Float[Array, "v 3"],
     units: Float[Array, "52 v 3"],
-    mechanics: Mechanics,
+    deformer: FaceDeformer,
 ) -> None:
     print(f"\n| pixels of eyeball, {len(_VIEWS)} views, {_PX_PER_MM:g} px/mm | offsets | live |")
     print("| --- | ---: | ---: |")
@@ -92,7 +92,7 @@ def _print_closed_eyes(
             for name in names
             for side in SIDES
         ]
-        live = mechanics.applied(neutral, np.eye(len(units))[chosen].sum(axis=0))
+        live = deformer.deform(neutral, np.eye(len(units))[chosen].sum(axis=0))
         states = (neutral + units[chosen].sum(axis=0), live)
         counts = [sum(_eyeball_pixels(generic, state, side) for side in SIDES) for state in states]
         print(f"| {' + '.join(names)} | {counts[0]} | {counts[1]} |")
@@ -125,7 +125,7 @@ def _print_times(
     generic: GenericHead,
     neutral: Float[Array, "v 3"],
     units: Float[Array, "52 v 3"],
-    mechanics: Mechanics,
+    deformer: FaceDeformer,
 ) -> None:
     def posed(**weights: float) -> Array:
         added = [w * units[generic.unit_names.index(name)] for name, w in weights.items()]
@@ -137,10 +137,10 @@ def _print_times(
     for title, rounds, run in (
         ("transfer_units", 3, lambda: transfer_units(generic, neutral)),
         ("fit_units", 3, lambda: fit_units(generic, neutral)),
-        ("Mechanics.of", 3, lambda: Mechanics.of(generic, neutral, units)),
-        ("resolved, no contact", 200, lambda: mechanics.contacts.resolved(apart)),
-        ("resolved, lids", 200, lambda: mechanics.contacts.resolved(lids)),
-        ("resolved, lips", 200, lambda: mechanics.contacts.resolved(lips)),
+        ("FaceDeformer.of", 3, lambda: FaceDeformer.of(generic, neutral, units)),
+        ("resolved, no contact", 200, lambda: deformer.contacts.resolve(apart)),
+        ("resolved, lids", 200, lambda: deformer.contacts.resolve(lids)),
+        ("resolved, lips", 200, lambda: deformer.contacts.resolve(lips)),
     ):
         print(f"| {title} | {_median_ms(run, rounds):.2f} |")
 

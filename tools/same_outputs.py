@@ -4,11 +4,10 @@
     python -m tools.same_outputs make AFTER --photos DIR --clip CLIP
     python -m tools.same_outputs compare BEFORE AFTER
 
-`make` runs every command that writes something, each on what the ones before it made. A run that
-compiles kernels rounds otherwise than one that loads them, so each version runs `demo` beforehand,
-which compiles most. `compare` prints a Markdown table, a row a command: files that are the same to
-the byte, files whose content is the same (frames of videos, values of arrays and tables), and by
-how much the others differ.
+`make` runs every command that writes something, each on what the ones before it made, twice: a run
+that compiles kernels rounds otherwise than one that loads them. `compare` prints a Markdown table,
+a row a result: files that are the same to the byte, files whose content is the same (frames of
+videos, values of arrays and tables), and by how much the others differ.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -81,23 +81,26 @@ def commands(folder: Path, photos: Path, clip: Path) -> Iterator[tuple[str, list
 
 def make(folder: Path, photos: Path, clip: Path, tree: Path) -> None:
     """Run everything with the mien of this checkout; a command that fails leaves its message."""
+    with tempfile.TemporaryDirectory() as first:
+        run_all(Path(first), photos, clip, tree)
     folder.mkdir(parents=True)
+    run_all(folder, photos, clip, tree)
+
+
+def run_all(folder: Path, photos: Path, clip: Path, tree: Path) -> None:
+    """Every command once, its output into the folder."""
     (folder / "take.json").write_text(json.dumps(TIMELINE))
+    (folder / "printed").mkdir()
     environment = os.environ | {"PYTHONPATH": str(tree / "src")}
-    start = [sys.executable, "-m", "mien"]
-    warm = [*start, "demo", "-o", "warm"]
-    subprocess.run(warm, cwd=folder, env=environment, check=True, capture_output=True)
     for name, arguments in commands(folder, photos, clip):
         for word in arguments:
             if "/" in word and not word.startswith("/"):
                 (folder / word).parent.mkdir(exist_ok=True)
         began = time.perf_counter()
-        run = subprocess.run(
-            [*start, *arguments], cwd=folder, env=environment, capture_output=True, text=True
-        )
-        printed = folder / "printed" / f"{name.replace(' ', '_')}.txt"
-        printed.parent.mkdir(exist_ok=True)
-        printed.write_text(f"{run.returncode}\n{run.stdout}\n{run.stderr}")
+        command = [sys.executable, "-m", "mien", *arguments]
+        run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+        printed = f"{run.returncode}\n{run.stdout}\n{run.stderr}"
+        (folder / "printed" / f"{name.replace(' ', '_')}.txt").write_text(printed)
         print(f"{name}: {run.returncode}, {time.perf_counter() - began:.0f} s", flush=True)
 
 
@@ -121,8 +124,6 @@ def compare(before: Path, after: Path) -> dict[str, Row]:
     rows: dict[str, Row] = {}
     paths = {p.relative_to(f) for f in (before, after) for p in f.rglob("*") if p.is_file()}
     for path in sorted(paths):
-        if path.parts[0] == "warm":
-            continue
         row = rows.setdefault(path.parts[0], Row())
         pair = before / path, after / path
         if not all(file.exists() for file in pair):

@@ -1,4 +1,4 @@
-"""A pinhole camera that looks at a head."""
+"""A pinhole camera in head space."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class Camera:
     of the image, centre of the first pixel at (0.5, 0.5).
 
     Attributes:
-        width: image size in px.
-        height: image size in px.
+        width: of the image, px.
+        height: of the image, px.
         focal_px: focal length in px.
         R_cam_head: (3, 3) rotation from head space to camera space.
         t_cam_head: (3,) mm, position of the head's origin in camera space.
@@ -56,7 +56,7 @@ class Camera:
 
     @property
     def center(self) -> Float[Array, " 3"]:
-        """(3,) mm: the camera's place in head space."""
+        """(3,) mm: the camera's position in head space."""
         return -self.R_cam_head.T @ self.t_cam_head
 
     def to_camera(self, points: Float[Array, "n 3"]) -> Float[Array, "n 3"]:

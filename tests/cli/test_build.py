@@ -16,7 +16,7 @@ from PIL import Image
 
 from mien.errors import InputError
 from mien.io.head.head_folder import load_head, save_head
-from mien.rig.regions import MASKS
+from mien.rig.regions import MASK_NAMES
 from terminal import FAST, SHORT_TURNTABLE, Built, Mien
 
 Contents = Callable[[Path], dict[str, bytes]]
@@ -35,7 +35,7 @@ def test_the_head_folder_is_what_the_design_says(built: Built) -> None:
         "photos/right.png",
         "annotations/left.json",
         "annotations/right.json",
-        *(f"regions/{name}.png" for name in MASKS),
+        *(f"regions/{name}.png" for name in MASK_NAMES),
         ".mien-files.json",
     }
 

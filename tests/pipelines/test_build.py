@@ -15,7 +15,7 @@ from mien.errors import EstimationError
 from mien.pipelines.build import Build, BuildOptions, build_head
 from mien.reconstruction.fit import FitOptions
 from mien.reconstruction.registration import NOTHING_SHARED
-from mien.rig.expression_textures import paint_expressions
+from mien.rig.expression_textures import extract_expression_textures
 from mien.texture.extract import Texture
 from mien.texture.surface import SurfaceMap
 from people import camera, person, photographed
@@ -51,10 +51,10 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
         seen.photographed = {
             name: [photo[0, 0, 0] for photo in item.photos] for name, item in photographed.items()
         }
-        return paint_expressions(mesh, photographed, *others)
+        return extract_expression_textures(mesh, photographed, *others)
 
     monkeypatch.setattr("mien.pipelines.head_textures.extract_texture", grey)
-    monkeypatch.setattr("mien.pipelines.head_textures.paint_expressions", paint)
+    monkeypatch.setattr("mien.pipelines.head_textures.extract_expression_textures", paint)
     return seen
 
 

@@ -20,7 +20,7 @@ from mien.reading.strict_json import (
     as_whole,
     errors_name_file,
     read_json,
-    unknown,
+    unknown_name,
 )
 
 
@@ -136,7 +136,7 @@ def test_names_are_there_once() -> None:
 
 def test_names_of_a_million_letters_are_cut_short() -> None:
     start = time.perf_counter()
-    assert len(unknown("unit", "a" * 1_000_000, [f"unit{i}" for i in range(1000)])) < 300
+    assert len(unknown_name("unit", "a" * 1_000_000, [f"unit{i}" for i in range(1000)])) < 300
     assert time.perf_counter() - start < 1
 
 

@@ -11,21 +11,21 @@ from mien.arrays import Array
 from mien.assets.generic import load_generic_head
 from mien.capture.source import load_capture
 from mien.pipelines.demo import demo_photos
-from mien.reconstruction.dense.eyes import seat_eyes
+from mien.reconstruction.dense.eyeballs import fit_eyeballs
 from mien.reconstruction.fit import FitOptions, fit_views
-from mien.rig.contacts.contacts import Mechanics, fit_units
+from mien.rig.deformer import FaceDeformer, fit_units
 from mien.rig.unit_transfer import transfer_units
 from people import person
 
 
 @dataclass(frozen=True)
 class Rigged:
-    """A head, its units before and after contacts were resolved, and its mechanics."""
+    """A head, its units before and after contacts were resolved, and its deformer."""
 
     neutral: Array
     transferred: Array
     units: Array
-    mechanics: Mechanics
+    deformer: FaceDeformer
 
     def weights(self, **weights: float) -> Array:
         """(52,) the units' weights."""
@@ -41,11 +41,11 @@ class Rigged:
     def moved(self, gaze: tuple[float, float] = (0.0, 0.0), **weights: float) -> Array:
         """(V, 3) mm: with turning eyes, contacts unresolved. Gaze is yaw and pitch, radians."""
         units = self.weights(**weights)
-        return self.mechanics.applied(self.neutral, units, np.array(gaze), contacts=False)
+        return self.deformer.deform(self.neutral, units, np.array(gaze), contacts=False)
 
     def living(self, gaze: tuple[float, float] = (0.0, 0.0), **weights: float) -> Array:
         """(V, 3) mm: with turning eyes and contacts."""
-        return self.mechanics.applied(self.neutral, self.weights(**weights), np.array(gaze))
+        return self.deformer.deform(self.neutral, self.weights(**weights), np.array(gaze))
 
 
 def both(name: str, weight: float = 1.0) -> dict[str, float]:
@@ -64,12 +64,12 @@ def rigged(request: pytest.FixtureRequest) -> Rigged:
     if request.param == "James":
         views = load_capture(demo_photos()).expressions["neutral"]
         fit = fit_views(views, generic, FitOptions(dense=False))
-        vertices = seat_eyes(np.array(fit.vertices), generic)
+        vertices = fit_eyeballs(np.array(fit.vertices), generic)
     elif request.param != "generic":
         seed = int(request.param[-1])
         bumps = np.random.default_rng(seed).normal(size=(8, 2, 3))
         waves = np.sin(vertices @ (bumps[:, 0].T / 12)) @ bumps[:, 1] * 0.1
         vertices = person(seed) + waves
     units = fit_units(generic, vertices)
-    mechanics = Mechanics.of(generic, vertices, units)
-    return Rigged(vertices, transfer_units(generic, vertices), units, mechanics)
+    deformer = FaceDeformer.of(generic, vertices, units)
+    return Rigged(vertices, transfer_units(generic, vertices), units, deformer)

@@ -10,8 +10,12 @@ from mien.arrays import Array
 from mien.camera import Camera
 from mien.head import SHADING
 from mien.render.shade import render
-from mien.rig.expression_textures import Looks, Photographed, paint_expressions
-from mien.rig.shading import Openings, brightness_at
+from mien.rig.expression_textures import (
+    ExpressionPhotos,
+    ExpressionTextures,
+    extract_expression_textures,
+)
+from mien.rig.shading import OpeningMeter, brightness_at
 from mien.texture.atlas import atlas_surface
 from mien.texture.surface import part_mask
 from posable import REST, explained_by
@@ -36,7 +40,7 @@ SHAPES = {
     ),
 }
 LIGHT = {
-    name: brightness_at(Openings.of(GENERIC, REST).measure(shape), SHADING)
+    name: brightness_at(OpeningMeter.of(GENERIC, REST).measure(shape), SHADING)
     for name, shape in SHAPES.items()
 }
 
@@ -77,13 +81,15 @@ def base() -> Array:
 
 
 @cache
-def looks(exposure: float = 1.0) -> Looks:
+def looks(exposure: float = 1.0) -> ExpressionTextures:
     """What comes of one photo of each, the last of another exposure."""
     camera = close_up()
-    shown = {name: Photographed(shape, [camera], [photo(name)]) for name, shape in SHAPES.items()}
+    shown = {
+        name: ExpressionPhotos(shape, [camera], [photo(name)]) for name, shape in SHAPES.items()
+    }
     darker = photo("awe", exposure)
-    shown["awe"] = Photographed(SHAPES["awe"], [camera], [darker])
-    return paint_expressions(GENERIC.mesh, shown, base(), GENERIC)
+    shown["awe"] = ExpressionPhotos(SHAPES["awe"], [camera], [darker])
+    return extract_expression_textures(GENERIC.mesh, shown, base(), GENERIC)
 
 
 def off(name: str, where: Array) -> Array:

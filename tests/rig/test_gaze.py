@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mien.assets.generic import load_generic_head
-from mien.rig.gaze import LOOK_UNITS, Eyeball, Look, look_angles
+from mien.rig.gaze import EYE_LOOK_UNITS, Eyeball, GazeModel, eye_look_angles
 
 if TYPE_CHECKING:
     from conftest import Rigged
@@ -16,8 +16,8 @@ VERTICES = GENERIC.mesh.vertices
 
 
 def test_the_units_turn_eyeballs_to_where_their_names_say() -> None:
-    angles = look_angles(GENERIC)
-    assert set(angles) == set(LOOK_UNITS)
+    angles = eye_look_angles(GENERIC)
+    assert set(angles) == set(EYE_LOOK_UNITS)
     for name, (yaw, pitch) in angles.items():
         left = name.endswith("Left")
         assert np.sign(pitch) == {"Up": 1, "Down": -1}.get(
@@ -54,25 +54,25 @@ def test_an_eyeball_that_is_not_round_stays_within_its_surface() -> None:
 def test_straight_ahead_changes_nothing(rigged: Rigged) -> None:
     posed = rigged.posed(jawOpen=0.2)
     np.testing.assert_allclose(rigged.moved(jawOpen=0.2), posed, rtol=0, atol=1e-12)
-    eyeball = rigged.mechanics.look.eyeballs[0]
+    eyeball = rigged.deformer.gaze_model.eyeballs[0]
     points = posed[eyeball.vertices]
     assert eyeball.turned(points, 0.0, 0.0) is points
 
 
 def test_units_and_gaze_drive_the_same_turn(rigged: Rigged) -> None:
-    look: Look = rigged.mechanics.look
+    gaze_model: GazeModel = rigged.deformer.gaze_model
     (yaw_in, _), (yaw_out, _) = (
-        look_angles(GENERIC)[name] for name in ("eyeLookInLeft", "eyeLookOutRight")
+        eye_look_angles(GENERIC)[name] for name in ("eyeLookInLeft", "eyeLookOutRight")
     )
     weights = {"eyeLookInLeft": 0.5, "eyeLookOutRight": 0.5 * yaw_in / yaw_out}
     by_units = rigged.moved(**weights)
     by_gaze = rigged.moved((0.5 * yaw_in, 0.0))
-    for eyeball in look.eyeballs:
+    for eyeball in gaze_model.eyeballs:
         np.testing.assert_allclose(by_units[eyeball.vertices], by_gaze[eyeball.vertices], atol=1e-5)
 
 
 def test_at_weight_one_the_offsets_are_the_turn(rigged: Rigged) -> None:
-    for name in LOOK_UNITS:
+    for name in EYE_LOOK_UNITS:
         weights = {name: 1.0}
         np.testing.assert_allclose(rigged.moved(**weights), rigged.posed(**weights), atol=1e-5)
 
@@ -85,6 +85,6 @@ def test_upper_lids_follow_the_pupil(rigged: Rigged) -> None:
 
 def test_far_down_the_eye_is_still_open(rigged: Rigged) -> None:
     down = rigged.living((0.0, np.radians(-25)))
-    for lids in rigged.mechanics.contacts.lids:
-        opening = -lids.overlap(lids.places(down)) * lids.eyeball.radius
+    for lids in rigged.deformer.contacts.lids:
+        opening = -lids.overlap(lids.spherical(down)) * lids.eyeball.radius
         assert opening.max() > 1.0

@@ -7,7 +7,7 @@ from marbled import GENERIC
 from mien.arrays import Array
 from mien.errors import InputError
 from mien.rig.followers import part_vertices
-from mien.rig.regions import AROUND, MASKS, check_masks, default_masks
+from mien.rig.regions import ENCLOSING_REGIONS, MASK_NAMES, check_masks, default_masks
 
 DEFAULT = default_masks(GENERIC)
 WHOLE = {
@@ -28,7 +28,7 @@ def lines(*names: str) -> list[tuple[str, ...]]:
 
 
 def test_a_partition_of_the_face() -> None:
-    assert tuple(DEFAULT) == MASKS
+    assert tuple(DEFAULT) == MASK_NAMES
     for mask in DEFAULT.values():
         assert mask.shape == (COUNT,)
         assert mask.min() == 0
@@ -110,17 +110,17 @@ def test_each_eyeball_belongs_to_its_side() -> None:
 
 
 def test_every_region_lies_in_those_around_it() -> None:
-    assert set(MASKS) <= set(AROUND)
-    for region, around in AROUND.items():
+    assert set(MASK_NAMES) <= set(ENCLOSING_REGIONS)
+    for region, around in ENCLOSING_REGIONS.items():
         assert region == "face" or around[-1] == "face"
         for index, name in enumerate(around):
-            assert AROUND[name] == around[index + 1 :]
+            assert ENCLOSING_REGIONS[name] == around[index + 1 :]
 
 
 def test_masks_that_overlap_are_scaled_down() -> None:
     masks = {"left_mouth": np.full(4, 1.0), "left_eye": np.array([0.0, 0.5, 1.0, 1.0])}
     checked = check_masks(masks, 4)
-    assert tuple(checked) == MASKS
+    assert tuple(checked) == MASK_NAMES
     np.testing.assert_allclose(checked["left_mouth"], [1, 1 / 1.5, 0.5, 0.5])
     np.testing.assert_allclose(checked["left_eye"], [0, 0.5 / 1.5, 0.5, 0.5])
     assert not checked["right_eye"].any()

@@ -13,10 +13,9 @@ from mien.mesh import Mesh
 from mien.render.morph import MorphRenderer
 from mien.render.shade import render
 from mien.rig.followers import part_vertices
-from mien.rig.gaze import Eyeball, look_angles, with_turned_eyes
+from mien.rig.gaze import Eyeball, eye_look_angles, with_turned_eyes
 from mien.rig.regions import default_masks
-from mien.rig.rig import REGIONS as MIXED_REGIONS
-from mien.rig.rig import Rig, region_rows
+from mien.rig.rig import WEIGHTED_REGIONS, Rig, region_rows
 from mien.rig.state import FaceState, Gaze, PosedFace
 from posable import (
     ANGER_GAZE,
@@ -253,7 +252,9 @@ def test_eyes_of_an_expression_turn_on_when_a_unit_turns_them() -> None:
     eyeball = Eyeball.of(GENERIC, REST, "left")
     yaw, pitch = ANGER_GAZE[0]
     expected = eyeball.turned(REST[eyeball.vertices], yaw, pitch)
-    expected = eyeball.turned(expected, *np.multiply(0.6, look_angles(GENERIC)["eyeLookUpLeft"]))
+    expected = eyeball.turned(
+        expected, *np.multiply(0.6, eye_look_angles(GENERIC)["eyeLookUpLeft"])
+    )
     np.testing.assert_allclose(face.vertices[eyeball.vertices], expected, atol=1e-6)
 
 
@@ -271,7 +272,7 @@ def test_numbers_make_the_face_of_the_state_that_they_stand_for() -> None:
 
 def test_regions_obey_the_nearest_around_them() -> None:
     given = ("eyes", "left_mouth", "forehead")
-    assert MIXED_REGIONS[-1] == "face"
+    assert WEIGHTED_REGIONS[-1] == "face"
     np.testing.assert_array_equal(region_rows(given), [2, 0, 1, 1, 3, 3, 0])
     np.testing.assert_array_equal(region_rows(()), np.zeros(7))
     with pytest.raises(InputError, match=r"region: expected .* such as mouth, got muoth"):

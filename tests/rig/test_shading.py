@@ -7,8 +7,8 @@ from marbled import GENERIC
 from mien.arrays import Array
 from mien.head import SHADING
 from mien.rig.shading import (
-    MOST_OPEN,
-    Openings,
+    MAX_OPENING,
+    OpeningMeter,
     Polynomial,
     brightness_at,
     fit_polynomial,
@@ -24,12 +24,12 @@ def value(polynomial: Polynomial, openings: Array) -> Array:
 
 
 def openings_of(part: str, count: int) -> Array:
-    return np.linspace(0.0, MOST_OPEN[part], count)
+    return np.linspace(0.0, MAX_OPENING[part], count)
 
 
 def known(part: str) -> Polynomial:
     """A person whose eyes and teeth lie in a deeper shadow than usual, as bright wide open."""
-    wide = MOST_OPEN[part]
+    wide = MAX_OPENING[part]
     c0, c1, c2 = SHADING[part]
     return c0 - 0.1, c1 + 0.1 / wide + 0.2, c2 - 0.2 / wide
 
@@ -78,7 +78,7 @@ def test_one_pair_of_photos_goes_part_of_the_way(part: str) -> None:
         value(p, np.array(first[0])) / value(p, np.array(first[1])) for p in (SHADING[part], found)
     ]
     assert abs(ratio[1] - first[2]) < 0.8 * abs(ratio[0] - first[2])
-    wide = np.array(MOST_OPEN[part])
+    wide = np.array(MAX_OPENING[part])
     assert value(found, wide) == pytest.approx(value(SHADING[part], wide), abs=0.02)
 
 
@@ -110,10 +110,10 @@ def test_brightness_has_bounds() -> None:
 
 def test_openings_are_ratios() -> None:
     """1 for lids at rest; lips apart over the mouth's width; no matter how large the head is."""
-    openings = Openings.of(GENERIC, REST)
+    openings = OpeningMeter.of(GENERIC, REST)
     rest = openings.measure(REST)
     np.testing.assert_allclose(rest[:2], 1)
-    larger = Openings.of(GENERIC, 1.3 * REST)
+    larger = OpeningMeter.of(GENERIC, 1.3 * REST)
     np.testing.assert_allclose(larger.measure(1.3 * REST), rest)
     open_wide = openings.measure(explained_by({"jawOpen": 1.0}))
     np.testing.assert_allclose(open_wide[:2], 1, atol=0.05)
@@ -121,7 +121,7 @@ def test_openings_are_ratios() -> None:
 
 
 def test_each_eye_has_an_opening_of_its_own() -> None:
-    openings = Openings.of(GENERIC, REST)
+    openings = OpeningMeter.of(GENERIC, REST)
     left, right, mouth = openings.measure(explained_by({"eyeBlinkLeft": 0.7}))
     assert left < 0.6
     assert right == pytest.approx(1, abs=0.01)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mien.arrays import Array
-from mien.rig.unit_decomposition import Explanations
+from mien.rig.unit_decomposition import UnitDecomposition
 
-SPARING = 0.05
+RIDGE = 0.05
 LEFT, RIGHT, BOTH, NOWHERE = range(4)
 """Units: of the left, of the right, of both, and one that no expression has."""
 
@@ -33,20 +33,20 @@ def offsets() -> Array:
     return np.tensordot(WEIGHTS, units(), axes=1) + rest
 
 
-KNOWN = Explanations.of(WEIGHTS, units(), offsets(), MASKS)
+KNOWN = UnitDecomposition.of(WEIGHTS, units(), offsets(), MASKS)
 
 
 def cost(region: int, asked: Array, shares: Array) -> float:
     """How far the shares' units are from those asked for, and how much comes along."""
     known = KNOWN.by_region[region, 1:]
     wanted = asked * (known != 0).any(axis=0)
-    return float(((shares @ known - wanted) ** 2).sum() + SPARING**2 * (shares**2).sum())
+    return float(((shares @ known - wanted) ** 2).sum() + RIDGE**2 * (shares**2).sum())
 
 
 def test_what_the_units_do_not_explain_is_left_over() -> None:
-    rebuilt = np.tensordot(WEIGHTS, units(), axes=1) + KNOWN.left_over
+    rebuilt = np.tensordot(WEIGHTS, units(), axes=1) + KNOWN.residuals
     np.testing.assert_allclose(rebuilt[1:], offsets()[1:], atol=1e-12)
-    assert not KNOWN.left_over[0].any()
+    assert not KNOWN.residuals[0].any()
 
 
 def test_units_concern_the_regions_that_they_move_and_the_rest() -> None:
@@ -61,7 +61,7 @@ def test_the_shares_are_the_optimum(seed: int) -> None:
     """No feasible nudge is better: one more or less, one for another, or any."""
     rng = np.random.default_rng(seed)
     asked = rng.uniform(-0.3, 1.2, 4)
-    for region, shares in enumerate(KNOWN.driven(asked)):
+    for region, shares in enumerate(KNOWN.expression_weights(asked)):
         assert (shares >= 0).all()
         assert shares.sum() <= 1 + 1e-3
         best = cost(region, asked, shares)
@@ -75,41 +75,43 @@ def test_the_shares_are_the_optimum(seed: int) -> None:
 
 
 def test_no_units_bring_nothing() -> None:
-    np.testing.assert_array_equal(KNOWN.driven(np.zeros(4)), np.zeros((3, 3)))
+    np.testing.assert_array_equal(KNOWN.expression_weights(np.zeros(4)), np.zeros((3, 3)))
 
 
 @pytest.mark.parametrize("weight", [-1.0, 0.3, 1.0])
 def test_a_unit_that_no_expression_has_brings_nothing(weight: float) -> None:
-    np.testing.assert_array_equal(KNOWN.driven(weight * np.eye(4)[NOWHERE]), np.zeros((3, 3)))
+    np.testing.assert_array_equal(
+        KNOWN.expression_weights(weight * np.eye(4)[NOWHERE]), np.zeros((3, 3))
+    )
     asked = np.array([0.5, 0.2, 0.1, 0.0])
-    with_it = KNOWN.driven(asked + weight * np.eye(4)[NOWHERE])
-    np.testing.assert_allclose(with_it, KNOWN.driven(asked), atol=1e-9)
+    with_it = KNOWN.expression_weights(asked + weight * np.eye(4)[NOWHERE])
+    np.testing.assert_allclose(with_it, KNOWN.expression_weights(asked), atol=1e-9)
 
 
 def test_the_opposite_of_an_expression_brings_nothing() -> None:
-    assert KNOWN.driven(-WEIGHTS[1]).max() < 1e-6
+    assert KNOWN.expression_weights(-WEIGHTS[1]).max() < 1e-6
 
 
 @pytest.mark.parametrize("expression", [1, 2])
 def test_the_units_of_an_expression_bring_it(expression: int) -> None:
     """In the rest of the head, which all units concern; a sparing share is missing."""
-    rest = KNOWN.driven(WEIGHTS[expression])[2]
+    rest = KNOWN.expression_weights(WEIGHTS[expression])[2]
     np.testing.assert_allclose(rest, np.eye(3)[expression - 1], atol=0.02)
-    half = KNOWN.driven(0.5 * WEIGHTS[expression])[2]
+    half = KNOWN.expression_weights(0.5 * WEIGHTS[expression])[2]
     np.testing.assert_allclose(half, 0.5 * np.eye(3)[expression - 1], atol=0.02)
 
 
 def test_units_past_an_expression_bring_no_more_than_all_of_it() -> None:
-    for shares in KNOWN.driven(3 * WEIGHTS[3]):
+    for shares in KNOWN.expression_weights(3 * WEIGHTS[3]):
         assert shares.sum() == pytest.approx(1, abs=1e-3)
 
 
 def test_a_side_has_shares_of_its_own() -> None:
-    shares = KNOWN.driven(np.array([0.0, 0.9, 0.0, 0.0]))
+    shares = KNOWN.expression_weights(np.array([0.0, 0.9, 0.0, 0.0]))
     assert not shares[0].any()
     assert shares[1].max() > 0.9
 
 
 def test_neutral_alone_brings_nothing() -> None:
-    alone = Explanations.of(WEIGHTS[:1], units(), offsets()[:1] * 0, MASKS)
-    assert alone.driven(np.ones(4)).shape == (3, 0)
+    alone = UnitDecomposition.of(WEIGHTS[:1], units(), offsets()[:1] * 0, MASKS)
+    assert alone.expression_weights(np.ones(4)).shape == (3, 0)

@@ -7,7 +7,7 @@ from mien.arrays import Array
 from mien.assets.generic import load_generic_head
 from mien.errors import InputError
 from mien.numeric.rotation import rotation_from_vector
-from mien.rig.contacts.contacts import fit_units
+from mien.rig.deformer import fit_units
 from mien.rig.followers import part_vertices
 from mien.rig.unit_transfer import local_stretch, transfer_units
 from people import person

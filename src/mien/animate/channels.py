@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from mien.arrays import Array, Float
 from mien.errors import InputError
-from mien.rig.regions import AROUND
+from mien.rig.regions import ENCLOSING_REGIONS
 from mien.rig.state import FACE, FaceState, Gaze
 
 HEAD, GAZE, UNITS = "head", "gaze", "units"
@@ -15,7 +15,7 @@ HEAD, GAZE, UNITS = "head", "gaze", "units"
 MEMBERS = {HEAD: ("yaw", "pitch", "roll", "x", "y", "z"), GAZE: ("yaw", "pitch")}
 ANGLES = frozenset(f"{group}.{name}" for group in MEMBERS for name in ("yaw", "pitch", "roll"))
 
-REGIONS = tuple(AROUND)
+REGION_NAMES = tuple(ENCLOSING_REGIONS)
 
 
 def split(channel: str) -> tuple[str, str]:
@@ -46,7 +46,7 @@ def to_state(values: Mapping[str, float]) -> FaceState:
 
 def _with_surroundings(own: Mapping[str, Mapping[str, float]], region: str) -> dict[str, float]:
     total: dict[str, float] = {}
-    for name in (*AROUND.get(region, (FACE,)), region):
+    for name in (*ENCLOSING_REGIONS.get(region, (FACE,)), region):
         for expression, weight in own.get(name, {}).items():
             total[expression] = total.get(expression, 0.0) + weight
     return total

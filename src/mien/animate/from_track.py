@@ -12,7 +12,7 @@ from mien.animate.timeline import PIVOT_MM, Moment, Timeline
 from mien.arrays import Array, Float
 from mien.camera import Camera
 from mien.errors import InputError
-from mien.rig.regions import AROUND
+from mien.rig.regions import ENCLOSING_REGIONS
 from mien.rig.state import FACE
 from mien.track.state import GAZE, Layout, Track, TrackedFrame, TrackState
 
@@ -83,7 +83,9 @@ def _face_values(layout: Layout, states: list[TrackState]) -> dict[str, Float[Ar
     given = dict(zip(layout.channels, np.array([state.values for state in states]).T, strict=True))
     values = {name: given[name] for name in (*(f"units.{u}" for u in layout.units), *GAZE)}
     for region in layout.regions:
-        around = next((r for r in AROUND.get(region, (FACE,)) if r in layout.regions), None)
+        around = next(
+            (r for r in ENCLOSING_REGIONS.get(region, (FACE,)) if r in layout.regions), None
+        )
         for name in layout.expressions[1:]:
             below = given[f"{around}.{name}"] if around else 0.0
             values[f"{region}.{name}"] = given[f"{region}.{name}"] - below

@@ -40,7 +40,7 @@ class AnnotationNames:
 
     @classmethod
     def of(cls, head: GenericHead) -> Self:
-        """The names that the generic head knows."""
+        """The names of the generic head's points and polylines."""
         vertices = (
             f"{name}.{index}"
             for name, polyline in head.polylines.items()

@@ -64,7 +64,7 @@ class Capture:
         name: of the source, without an ending.
         expressions: views by expression, never empty, `neutral` first where there is one; a source
             without expression folders holds `neutral` alone.
-        notes: what was left out, adapted or looks odd; each names its file.
+        notes: on what was left out, adapted or is odd; each names its file.
     """
 
     name: str

@@ -16,10 +16,10 @@ from mien.errors import FileFormatError, InputError
 from mien.head import NEUTRAL, Head
 from mien.io.files.atomic import check_file_place, check_files_apart
 from mien.io.timeline.timeline_file import check_timeline, load_timeline, timeline_files
-from mien.pipelines.explained import units_of
 from mien.progress import Progress, StepProgress, no_progress, stage_progress
 from mien.render.picture import GREY, HeadRenderer
 from mien.rig.state import FaceState
+from mien.rig.unit_decomposition import units_from_state
 
 SIZE = (720, 900)
 """Of pictures, px, unless the timeline or the user says."""
@@ -214,7 +214,7 @@ def _write_live_link(job: _Job, path: str | Path) -> int:
     from mien.io.live.live_link_csv import save_live_link
 
     head = job.renderer.head
-    return save_live_link(path, job.moments(), units_of=lambda state: units_of(head, state))
+    return save_live_link(path, job.moments(), units_of=lambda state: units_from_state(head, state))
 
 
 def _write_fap(job: _Job, path: str | Path) -> int:

@@ -26,8 +26,8 @@ from mien.reconstruction.fit import FitOptions, fit_views
 from mien.reconstruction.result import ExpressionFit, Fit, NeutralFit
 from mien.render.picture import turntable_frames
 from mien.report import ReportInput, render_report
-from mien.rig.contacts.contacts import Contacts, fit_units
-from mien.rig.contacts.lip_closing import meet_lips
+from mien.rig.contacts.lips import close_lips
+from mien.rig.deformer import Contacts, fit_units
 from mien.rig.gaze import with_turned_eyes
 from mien.rig.regions import default_masks
 from mien.texture.fill import Fill
@@ -163,7 +163,7 @@ def _fit_neutral(
     progress(0, len(capture.expressions))
     views = capture.expressions[NEUTRAL]
     fit = fit_views(views, generic, options, progress=_part(0, capture, progress))
-    fit = replace(fit, vertices=meet_lips(generic, fit.vertices))
+    fit = replace(fit, vertices=close_lips(generic, fit.vertices))
     views = tuple(view for view in views if view.photo.name in fit.photos)
     cameras = [fit.photos[view.photo.name].camera for view in views]
     units = fit_units(generic, fit.vertices)
@@ -184,7 +184,7 @@ def _fit_expressions(
         except EstimationError as error:
             notes.append(f"{name}: left out: {error}")
             continue
-        fits[name] = replace(fit, vertices=contacts.resolved(fit.vertices))
+        fits[name] = replace(fit, vertices=contacts.resolve(fit.vertices))
     progress(len(capture.expressions), len(capture.expressions))
     return fits, notes
 

@@ -9,7 +9,7 @@ from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import load_generic_head
 from mien.head import CYLINDER, NEUTRAL, FittedView, Head
 from mien.progress import StepProgress
-from mien.rig.expression_textures import Photographed, paint_expressions
+from mien.rig.expression_textures import ExpressionPhotos, extract_expression_textures
 from mien.texture.atlas import atlas_surface
 from mien.texture.cylinder import cylinder_surface, fit_cylinder
 from mien.texture.extract import Texture, extract_texture
@@ -42,14 +42,14 @@ def texture_head(
     base = _extract(head, photos, atlas_surface(head.mesh, width=size, height=size), fill)
     progress(1, total)
     photographed = {
-        name: Photographed(
+        name: ExpressionPhotos(
             item.vertices,
             [view.camera for view in item.views],
             [photos[view.photo] for view in item.views],
         )
         for name, item in head.expressions.items()
     }
-    painted = paint_expressions(head.mesh, photographed, base.pixels, load_generic_head())
+    painted = extract_expression_textures(head.mesh, photographed, base.pixels, load_generic_head())
     progress(2, total)
     around = cylinder_surface(head.mesh, fit_cylinder(head.mesh), parts=("skin",))
     cylinder = _extract(head, photos, around, fill)

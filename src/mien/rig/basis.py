@@ -1,7 +1,7 @@
-"""Blending weights of basic expressions, and the few numbers that stand for them.
+"""Blending weights of basic expressions, and their minimal parameters.
 
-Weights of m expressions that sum to 1 form a hyperplane, so m - 1 expression parameters say as
-much: w = Q alpha + w*. Source: [Pighin 2002] sec. 6.1.1, eq. (4).
+Weights of m expressions that sum to 1 form a hyperplane, which has m - 1 parameters:
+w = Q alpha + w*. Source: [Pighin 2002] sec. 6.1.1, eq. (4).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from mien.arrays import Array, Float, check_array, frozen
 from mien.errors import InputError
 
 WEIGHT_RANGE = (-0.5, 1.5)
-"""The lowest and the highest weight allowed: beyond, faces turn unreal.
+"""The lowest and the highest weight allowed; beyond it faces look unnatural.
 
 Source: [Pighin 2002] sec. 6.1.1.
 """
@@ -57,7 +57,11 @@ class Basis:
 
     @classmethod
     def by_differences(cls, m: int, *, reference: int = 0) -> Basis:
-        """One parameter for each other expression: how far from the reference towards it.
+        """One parameter for each expression but the reference: the weight of their difference.
+
+        Args:
+            m: number of expressions.
+            reference: index of one of them.
 
         Raises:
             InputError: no expression, a reference that is none of them.
@@ -72,14 +76,18 @@ class Basis:
 
     @classmethod
     def by_gram_schmidt(cls, m: int, *, reference: int = 0) -> Basis:
-        """The differences made orthonormal, one after the other in their order.
+        """The differences orthonormalized by Gram and Schmidt, in their order.
+
+        Args:
+            m: number of expressions.
+            reference: index of one of them.
 
         Raises:
             InputError: no expression, a reference that is none of them.
         """
         differences = cls.by_differences(m, reference=reference)
         Q, R = np.linalg.qr(differences.Q)
-        # Householder's reflections may turn a direction round; Gram and Schmidt's keeps it.
+        # Householder's reflections may flip a direction; Gram and Schmidt's method does not.
         return cls(Q * np.sign(np.diag(R)), differences.w_star)
 
     @classmethod
@@ -88,7 +96,7 @@ class Basis:
 
         A step of length 1 along a column changes geometry and texture by that column's singular
         value; columns do so independently of each other. Where expressions are alike, the last
-        columns change nothing: leave them out by `count`.
+        columns change nothing and can be left out by `count`.
 
         Args:
             examples: (m, d) geometry (and texture) of each expression as one row, in units that
@@ -117,7 +125,7 @@ class Basis:
         return alpha @ self.Q.T + self.w_star
 
     def alpha(self, weights: Float[Array, "*batch m"]) -> Float[Array, "*batch k"]:
-        """The parameters whose weights come nearest in least squares; exact where Q reaches.
+        """Least-squares parameters of these weights; exact in the span of Q.
 
         Raises:
             InputError: another number of weights.
@@ -138,7 +146,7 @@ def check_weights(
 
     Args:
         weights: one for each expression along the last axis.
-        name: how the message calls them.
+        name: for the message of an error.
 
     Raises:
         InputError: not finite, a sum that is off 1 by more than 1e-6, one that lies outside
@@ -160,7 +168,7 @@ def check_weights(
 def outside_hull(
     weights: Float[Array, "*batch m"], names: Sequence[str] | None = None
 ) -> str | None:
-    """What to warn the user of: weights beyond 0 to 1 show a face that nobody photographed.
+    """A warning for weights outside 0 to 1, which extrapolate the photographed expressions.
 
     Args:
         weights: one for each expression along the last axis.

@@ -1,7 +1,7 @@
-"""Textures of a person's expressions: each one's photos over neutral's, eyes and teeth in common.
+"""Textures of a person's expressions: layers over neutral's texture, with common eyes and teeth.
 
-Eyes and teeth are half hidden in most photos. What one expression shows of them serves all others
-([Pighin 2002] sec. 5.2.4), as bright as the opening of lids and lips lets them be.
+Eyes and teeth are half hidden in most photos. What one expression shows of them is used for all
+([Pighin 2002] sec. 5.2.4), shaded by the opening of lids and lips.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from mien.rig.regions import default_masks
 from mien.rig.shading import (
     EYES,
     TEETH,
-    Openings,
+    OpeningMeter,
     Polynomial,
     brightness_at,
     fit_polynomial,
@@ -39,24 +39,24 @@ _GROUPS: Mapping[str, tuple[int, str]] = {
     "lower_teeth": (2, TEETH),
     "tongue": (2, TEETH),
 }
-"""The parts in the shadow of lids and lips: which opening and which polynomial is theirs."""
+"""The parts shaded by lids and lips, with the index of their opening and their polynomial."""
 _MOUTH = 2
 _AROUND_MM = (4.0, 10.0)
-"""What belongs to an eye or a mouth: all within the first distance, nothing beyond the second."""
-_SEEN = 0.9
+"""Surroundings of an eye or mouth: weight 1 within the first distance, 0 beyond the second."""
+_MIN_CONFIDENCE = 0.9
 _TINTS = (0.4, 1.2)
-_ENOUGH = 60
+_MIN_TEXELS = 60
 """Texels of a part that two expressions must both show for their brightness to be compared."""
 
 
 @dataclass(frozen=True)
-class Photographed:
+class ExpressionPhotos:
     """An expression's shape and photos.
 
     Attributes:
         vertices: (V, 3) mm, eyes turned.
-        cameras: of those that show it.
-        photos: of those that show it.
+        cameras: of its photos.
+        photos: that show it.
     """
 
     vertices: Float[Array, "v 3"]
@@ -65,13 +65,13 @@ class Photographed:
 
 
 @dataclass(frozen=True)
-class Looks:
-    """How a person looks in each expression.
+class ExpressionTextures:
+    """The textures of all expressions.
 
     Attributes:
         textures: (H, W, 3) by expression.
         shading: of eyes and teeth.
-        gains: (K, 3) by expression, what each photo's colours were multiplied by.
+        gains: (K, 3) by expression, factors on each photo's colours.
     """
 
     textures: dict[str, UInt8[Array, "h w 3"]]
@@ -79,43 +79,46 @@ class Looks:
     gains: dict[str, Float[Array, "k 3"]]
 
 
-def paint_expressions(
+def extract_expression_textures(
     mesh: Mesh,
-    photographed: Mapping[str, Photographed],
+    photos: Mapping[str, ExpressionPhotos],
     base: UInt8[Array, "h w 3"],
     generic: GenericHead,
-) -> Looks:
+) -> ExpressionTextures:
     """Every expression's texture in the layout of neutral's.
 
     Args:
         mesh: neutral.
-        photographed: by expression, neutral among them.
+        photos: by expression, neutral among them.
         base: (H, W, 3) neutral's texture from all of its photos, holes filled.
+        generic: its topology and regions.
     """
     height, width = base.shape[:2]
     surface = atlas_surface(mesh, width=width, height=height)
-    looks = {
-        name: _look(mesh, surface, item, name, base, generic) for name, item in photographed.items()
+    layers = {
+        name: _layer(mesh, surface, item, name, base, generic) for name, item in photos.items()
     }
     texels = {part: part_mask(surface, mesh, part) for part in _GROUPS}
-    openings = Openings.of(generic, mesh.vertices)
-    opened = {name: openings.measure(item.vertices) for name, item in photographed.items()}
-    shading = _fit_shading(texels, looks, opened)
-    light = {name: brightness_at(at, shading) for name, at in opened.items()}
-    common = _common_parts(surface, mesh, texels, looks, light, base, generic)
+    openings = OpeningMeter.of(generic, mesh.vertices)
+    openings_of = {name: openings.measure(item.vertices) for name, item in photos.items()}
+    shading = _fit_shading(texels, layers, openings_of)
+    light = {name: brightness_at(at, shading) for name, at in openings_of.items()}
+    common = _common_parts(surface, mesh, texels, layers, light, base, generic)
     textures = {}
-    for name, look in looks.items():
+    for name, layer in layers.items():
         below = base.astype(np.float32)
         for part, (column, _) in _GROUPS.items():
             below[texels[part]] = common[texels[part]] * light[name][column]
-        textures[name] = look.over(below, surface)
-    return Looks(textures, shading, {name: look.gains for name, look in looks.items()})
+        textures[name] = layer.over(below, surface)
+    return ExpressionTextures(
+        textures, shading, {name: layer.gains for name, layer in layers.items()}
+    )
 
 
-def _look(
+def _layer(
     neutral: Mesh,
     surface: SurfaceMap,
-    item: Photographed,
+    item: ExpressionPhotos,
     name: str,
     base: UInt8[Array, "h w 3"],
     generic: GenericHead,
@@ -126,7 +129,7 @@ def _look(
         surface = atlas_surface(mesh, width=width, height=height)
     inside = np.maximum(generic.regions["mouth_cavity"], generic.regions["eye_socket"])
 
-    def seen_by(views: Sequence[int], within: Float[Array, " v"]) -> TextureLayer:
+    def layer_of(views: Sequence[int], within: Float[Array, " v"]) -> TextureLayer:
         return extract_expression_layer(
             mesh,
             [item.cameras[k] for k in views],
@@ -138,17 +141,17 @@ def _look(
         )
 
     if name != NEUTRAL or len(item.cameras) == 1:
-        return seen_by(
+        return layer_of(
             range(len(item.cameras)), np.sum(list(default_masks(generic).values()), axis=0)
         )
-    # The photos of a neutral face from several sides are blended already. What lies between and
-    # around lids and lips comes from one photo for each: two would not agree
+    # The photos of a neutral face from several sides are blended already. The inside and the
+    # surroundings of each slit come from one photo: two would not agree
     # ([Pighin 2002] sec. 5.2.4).
-    looks = [
-        seen_by([_best_view(mesh, lines, item.cameras)], mask)
+    layers = [
+        layer_of([_best_view(mesh, lines, item.cameras)], mask)
         for lines, mask in _slits(mesh, generic)
     ]
-    return reduce(TextureLayer.merged_with, looks)
+    return reduce(TextureLayer.merged_with, layers)
 
 
 def _slits(mesh: Mesh, generic: GenericHead) -> list[tuple[Int[Array, " n"], Float[Array, " v"]]]:
@@ -171,11 +174,11 @@ def _slits(mesh: Mesh, generic: GenericHead) -> list[tuple[Int[Array, " n"], Flo
 
 
 def _best_view(mesh: Mesh, around: Int[Array, " n"], cameras: Sequence[Camera]) -> int:
-    """The photo that shows the vertices largest and most squarely."""
-    places, normals = mesh.vertices[around], mesh.vertex_normals()[around]
+    """The photo that shows the vertices largest and most frontally."""
+    points, normals = mesh.vertices[around], mesh.vertex_normals()[around]
 
     def quality(camera: Camera) -> float:
-        towards = camera.center - places
+        towards = camera.center - points
         distance = np.linalg.norm(towards, axis=1)
         facing = np.einsum("vc,vc->v", towards, normals) / distance
         return float(np.mean(np.maximum(facing, 0) * camera.focal_px / distance))
@@ -185,37 +188,42 @@ def _best_view(mesh: Mesh, around: Int[Array, " n"], cameras: Sequence[Camera]) 
 
 def _fit_shading(
     texels: Mapping[str, Bool[Array, "h w"]],
-    looks: Mapping[str, TextureLayer],
-    opened: Mapping[str, Float[Array, " 3"]],
+    layers: Mapping[str, TextureLayer],
+    openings_of: Mapping[str, Float[Array, " 3"]],
 ) -> dict[str, Polynomial]:
-    """From how bright the expressions show the same texels."""
+    """Fitted to the brightness of the same texels in different expressions."""
     measured: dict[str, list[tuple[float, float, float]]] = {EYES: [], TEETH: []}
     for part, (column, kind) in _GROUPS.items():
-        most = _by_seen(looks, texels[part])[-1]
-        for name, look in looks.items():
-            ratio = _ratio(look, looks[most], texels[part])
-            if name != most and ratio is not None:
-                pair = float(opened[name][column]), float(opened[most][column])
+        reference = _by_coverage(layers, texels[part])[-1]
+        for name, layer in layers.items():
+            ratio = _brightness_ratio(layer, layers[reference], texels[part])
+            if name != reference and ratio is not None:
+                pair = (
+                    float(openings_of[name][column]),
+                    float(openings_of[reference][column]),
+                )
                 measured[kind].append((*pair, ratio))
     return {kind: fit_polynomial(kind, pairs) for kind, pairs in measured.items()}
 
 
 def _tint(surface: SurfaceMap, mesh: Mesh, base: UInt8[Array, "h w 3"]) -> Float[Array, " 3"]:
-    """(3,) by how much the person's skin is darker or warmer than skin usually is in photos."""
+    """(3,) ratio of the person's skin colour to the default one."""
     skin = base[part_mask(surface, mesh, "skin")]
     return np.clip(np.median(skin, axis=0) / np.array(SKIN.default), *_TINTS)
 
 
-def _by_seen(looks: Mapping[str, TextureLayer], texels: Bool[Array, "h w"]) -> list[str]:
-    """The expressions from the one that shows least of the texels to the one that shows most."""
-    return sorted(looks, key=lambda name: float(looks[name].confidence[texels].sum()))
+def _by_coverage(layers: Mapping[str, TextureLayer], texels: Bool[Array, "h w"]) -> list[str]:
+    """The expressions by how much of the texels they show, ascending."""
+    return sorted(layers, key=lambda name: float(layers[name].confidence[texels].sum()))
 
 
-def _ratio(look: TextureLayer, other: TextureLayer, texels: Bool[Array, "h w"]) -> float | None:
-    both = texels & (look.confidence > _SEEN) & (other.confidence > _SEEN)
-    if np.count_nonzero(both) < _ENOUGH:
+def _brightness_ratio(
+    layer: TextureLayer, other: TextureLayer, texels: Bool[Array, "h w"]
+) -> float | None:
+    both = texels & (layer.confidence > _MIN_CONFIDENCE) & (other.confidence > _MIN_CONFIDENCE)
+    if np.count_nonzero(both) < _MIN_TEXELS:
         return None
-    here, there = (np.maximum(item.colours[both].mean(axis=1), 1.0) for item in (look, other))
+    here, there = (np.maximum(item.colours[both].mean(axis=1), 1.0) for item in (layer, other))
     return float(np.median(here / there))
 
 
@@ -223,29 +231,28 @@ def _common_parts(
     surface: SurfaceMap,
     mesh: Mesh,
     texels: Mapping[str, Bool[Array, "h w"]],
-    looks: Mapping[str, TextureLayer],
+    layers: Mapping[str, TextureLayer],
     light: Mapping[str, Float[Array, " 3"]],
     base: UInt8[Array, "h w 3"],
     generic: GenericHead,
 ) -> Float[Array, "h w 3"]:
-    """(H, W, 3) eyes and teeth in full light: from the expression that shows most of each, then
+    """(H, W, 3) eyes and teeth in full light, from the expression that shows most of each first.
 
-    from the next. What none shows has neutral's colours, or usual ones, which take on the light
-    that is on the skin.
+    Texels that none shows have neutral's colours, or default ones in the light of the skin.
     """
     common = base.astype(np.float32)
     tint = _tint(surface, mesh, base)
-    places = interpolate_vertex_values(surface, mesh, generic.mesh.vertices)
+    points = interpolate_vertex_values(surface, mesh, generic.mesh.vertices)
     for part, (column, _) in _GROUPS.items():
         inside = texels[part]
         colours = common[inside] / light[NEUTRAL][column]
         if part.endswith("teeth"):
-            colours = default_teeth_colours(places[inside], part)
+            colours = default_teeth_colours(points[inside], part)
         if column == _MOUTH:
             colours *= tint
-        for name in _by_seen(looks, inside):
-            share = looks[name].opacity[inside][:, None]
-            own = looks[name].colours[inside] / light[name][column]
-            colours += share * (own - colours)
+        for name in _by_coverage(layers, inside):
+            opacity = layers[name].opacity[inside][:, None]
+            own = layers[name].colours[inside] / light[name][column]
+            colours += opacity * (own - colours)
         common[inside] = colours
     return common

@@ -1,4 +1,4 @@
-"""Lashes and hair: parts that have no motion of their own and follow the skin next to them."""
+"""Lashes and hair, which follow the nearest skin."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def part_vertices(generic: GenericHead, *parts: str) -> Int[Array, " p"]:
 
 @dataclass(frozen=True)
 class Followers:
-    """Which skin vertices carry each vertex of the lashes and the hair, and by how much.
+    """Skinning weights of lashes and hair on the nearest skin vertices.
 
     Attributes:
         vertices: (N,) the lashes' and the hair's vertices.
@@ -47,11 +47,11 @@ class Followers:
         return Followers(frozen(vertices), frozen(skin[nearest]), frozen(weights))
 
     def of_skin(self, vertices: Int[Array, " s"]) -> Followers:
-        """Those alone that any of these skin vertices carry."""
+        """The followers of these skin vertices."""
         some = np.isin(self.carriers, vertices).any(axis=1)
         parts = (self.vertices, self.carriers, self.weights)
         return Followers(*(frozen(part[some]) for part in parts))
 
     def carried(self, offsets: Float[Array, "*k v 3"]) -> Float[Array, "*k n 3"]:
-        """(..., N, 3) what offsets of the skin add to the followers."""
+        """(..., N, 3) offsets of the followers from offsets of the skin."""
         return np.einsum("...nic,ni->...nc", offsets[..., self.carriers, :], self.weights)

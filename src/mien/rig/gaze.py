@@ -1,4 +1,4 @@
-"""Eyes that look around: eyeballs turn about their own centres, lids go with the pupil."""
+"""Gaze: eyeballs rotate about their own centres and the lids follow."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from mien.numeric.kernels.jit import njit
 from mien.rig.followers import part_vertices
 
 SIDES = ("left", "right")
-_LAG = 0.35
-"""Of a gaze beyond what the units know, lids follow this share: they would close before it."""
-_WAYS = ("Down", "In", "Out", "Up")
-LOOK_UNITS = tuple(f"eyeLook{way}{side.capitalize()}" for way in _WAYS for side in SIDES)
-"""The units that turn the eyeballs."""
+_LID_GAIN = 0.35
+"""How far lids follow a gaze beyond weight 1 of the units; with 1 they would close too early."""
+_DIRECTIONS = ("Down", "In", "Out", "Up")
+EYE_LOOK_UNITS = tuple(
+    f"eyeLook{direction}{side.capitalize()}" for direction in _DIRECTIONS for side in SIDES
+)
+"""The units that rotate the eyeballs."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +29,8 @@ class Eyeball:
     Attributes:
         vertices: (B,) its vertices.
         centre: (3,) mm.
-        shape: (3, 3) takes the unit sphere around the origin to the eyeball around its centre. Its
-            largest vertex lies on it: cornea and facets are inside.
+        shape: (3, 3) maps the unit sphere around the origin to the eyeball around its centre. The
+            vertex furthest out lies on it: cornea and facets are inside.
     """
 
     vertices: Int[Array, " b"]
@@ -47,24 +49,23 @@ class Eyeball:
 
     @cached_property
     def radius(self) -> float:
-        """mm: that of the sphere of the same volume."""
+        """mm, of the sphere of the same volume."""
         return float(np.abs(np.linalg.det(self.shape)) ** (1 / 3))
 
     @cached_property
     def inverse(self) -> Float[Array, "3 3"]:
-        """Of the shape."""
+        """The inverse of shape."""
         return frozen(np.linalg.inv(self.shape))
 
     def on_sphere(self, points: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
-        """(N, 3) the points where the eyeball is the unit sphere around the origin."""
+        """(N, 3) the points in the space where the eyeball is the unit sphere."""
         return (points - self.centre) @ self.inverse.T
 
     def turned(self, points: Float[Array, "n 3"], yaw: float, pitch: float) -> Float[Array, "n 3"]:
-        """(N, 3) mm: points of the eyeball when it looks there (radians) and not straight ahead.
+        """(N, 3) mm: points of the eyeball rotated from straight ahead to this gaze (radians).
 
-        The turn takes the shortest way (Listing's law) on the sphere that the eyeball is an image
-        of: a round eyeball turns rigidly, one that is not slides along its own surface, so that
-        the lids on it stay where they are.
+        The smallest rotation (Listing's law) of the sphere that the eyeball is an affine image of:
+        a round eyeball moves rigidly, an ellipsoid along its own surface, so that lids stay on it.
         """
         if yaw == 0 and pitch == 0:
             return points
@@ -80,7 +81,7 @@ def _turned(points: Array, shape: Array, inverse: Array, yaw: float, pitch: floa
 
 @njit(cache=True, nogil=True)
 def _turn(inverse: Array, yaw: float, pitch: float) -> Array:
-    """(3, 3) the turn on the unit sphere, by Rodrigues' formula in sine and cosine."""
+    """(3, 3) rotation of the unit sphere by Rodrigues' formula."""
     towards = (np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch))
     before, after = inverse[:, 2].copy(), np.zeros(3)
     for axis in range(3):
@@ -95,13 +96,13 @@ def _turn(inverse: Array, yaw: float, pitch: float) -> Array:
     return turn
 
 
-def look_angles(generic: GenericHead) -> dict[str, tuple[float, float]]:
-    """Yaw and pitch, radians, by which each eyeLook unit turns its eyeball at weight 1.
+def eye_look_angles(generic: GenericHead) -> dict[str, tuple[float, float]]:
+    """Yaw and pitch, radians, by which each eyeLook unit rotates its eyeball at weight 1.
 
-    They are those of the rotation nearest to the generic unit's offsets.
+    Those of the rotation nearest to the generic unit's offsets.
     """
     angles = {}
-    for name in LOOK_UNITS:
+    for name in EYE_LOOK_UNITS:
         ball = part_vertices(generic, f"{_side(name)}_eyeball")
         places = generic.mesh.vertices[ball]
         moved = places + generic.unit_offsets[generic.unit_names.index(name)][ball]
@@ -118,12 +119,12 @@ def look_angles(generic: GenericHead) -> dict[str, tuple[float, float]]:
 def turn_eyeballs(
     generic: GenericHead, vertices: Float[Array, "v 3"], units: Float[Array, "52 v 3"]
 ) -> Float[Array, "52 v 3"]:
-    """The units with eyeballs that turn about their centres and do not leave their surface.
+    """The units with eyeballs that rotate about their centres.
 
-    At weight 1 an eyeLook unit ends where the turn ends; in between it cuts the corner.
+    An eyeLook unit is exact at weight 1; in between it is the chord of the rotation.
     """
     result = units.copy()
-    for name, (yaw, pitch) in look_angles(generic).items():
+    for name, (yaw, pitch) in eye_look_angles(generic).items():
         eyeball = Eyeball.of(generic, vertices, _side(name))
         places = vertices[eyeball.vertices]
         offsets = eyeball.turned(places, yaw, pitch) - places
@@ -143,12 +144,12 @@ def with_turned_eyes(
 
 
 @dataclass(frozen=True)
-class Look:
-    """How the eyes of one head look around.
+class GazeModel:
+    """How gaze and eyeLook units rotate the eyeballs of one head.
 
     Attributes:
         eyeballs: left and right.
-        units: (8,) which of the head's units are the eyeLook units, in the order of LOOK_UNITS.
+        units: (8,) indices of the eyeLook units, in the order of EYE_LOOK_UNITS.
         angles: (8, 2) yaw and pitch, radians, of the eyeballs at weight 1 of these.
     """
 
@@ -157,19 +158,19 @@ class Look:
     angles: Float[Array, "8 2"]
 
     @staticmethod
-    def of(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Look:
+    def of(generic: GenericHead, vertices: Float[Array, "v 3"]) -> GazeModel:
         """For a head with these neutral vertices, mm."""
         left, right = (Eyeball.of(generic, vertices, side) for side in SIDES)
-        chosen = [generic.unit_names.index(name) for name in LOOK_UNITS]
-        angles = look_angles(generic)
-        return Look(
+        chosen = [generic.unit_names.index(name) for name in EYE_LOOK_UNITS]
+        angles = eye_look_angles(generic)
+        return GazeModel(
             (left, right),
             frozen(np.array(chosen)),
-            frozen(np.array([angles[name] for name in LOOK_UNITS])),
+            frozen(np.array([angles[name] for name in EYE_LOOK_UNITS])),
         )
 
     def without_eyeballs(self, units: Float[Array, "52 v 3"]) -> Float[Array, "52 v 3"]:
-        """Unit offsets where the eyeLook units leave to a turn what eyeballs do."""
+        """Unit offsets whose eyeLook units do not move the eyeballs."""
         result = np.array(units)
         for eyeball in self.eyeballs:
             result[np.ix_(self.units, eyeball.vertices)] = 0
@@ -178,16 +179,16 @@ class Look:
     def motion(
         self, units: Float[Array, " u"], gaze: Float[Array, " 2"]
     ) -> tuple[Float[Array, " u"], Float[Array, "2 2"]]:
-        """What the weights of all units and a gaze (yaw and pitch, radians) come to.
+        """Unit weights and eyeball angles that follow from units and a gaze (yaw, pitch, radians).
 
         Returns:
-            (U,) the weights of the units' offsets, lids going along with the gaze; (2, 2) rad, yaw
+            (U,) weights of the units' offsets, lids following the gaze; (2, 2) rad, yaw
             and pitch of the left and the right eyeball.
         """
-        asked, weights = units[self.units], units.copy()
+        given, weights = units[self.units], units.copy()
         weights[self.units] += self._lid_weights(gaze)
         sides = range(len(self.eyeballs))
-        angles = np.array([gaze + asked[side::2] @ self.angles[side::2] for side in sides])
+        angles = np.array([gaze + given[side::2] @ self.angles[side::2] for side in sides])
         return weights, angles
 
     def turn(self, vertices: Float[Array, "v 3"], angles: Float[Array, "2 2"]) -> None:
@@ -198,10 +199,10 @@ class Look:
                 vertices[ball] = eyeball.turned(vertices[ball], yaw, pitch)
 
     def _lid_weights(self, gaze: Float[Array, " 2"]) -> Float[Array, " 8"]:
-        """How far the eyeLook units would turn the eyeballs as the gaze does, lagging beyond 1."""
+        """How far the eyeLook units would turn the eyeballs as the gaze does, less beyond 1."""
         size = (self.angles**2).sum(axis=1)
         shares = np.maximum(self.angles @ gaze / size, 0.0)
-        return np.minimum(shares, 1.0) + _LAG * np.maximum(shares - 1.0, 0.0)
+        return np.minimum(shares, 1.0) + _LID_GAIN * np.maximum(shares - 1.0, 0.0)
 
 
 def _side(unit: str) -> str:

@@ -11,7 +11,7 @@ from mien.assets.generic import GenericHead
 from mien.errors import InputError
 from mien.rig.state import FACE
 
-AROUND: Mapping[str, tuple[str, ...]] = {
+ENCLOSING_REGIONS: Mapping[str, tuple[str, ...]] = {
     FACE: (),
     "mouth": (FACE,),
     "eyes": (FACE,),
@@ -23,17 +23,24 @@ AROUND: Mapping[str, tuple[str, ...]] = {
     "left_forehead": ("forehead", FACE),
     "right_forehead": ("forehead", FACE),
 }
-"""All regions by name, and those around each from the nearest on."""
+"""All regions by name, each with the regions that contain it, nearest first."""
 
-MASKS = ("left_mouth", "right_mouth", "left_eye", "right_eye", "left_forehead", "right_forehead")
-"""The regions that have masks; the others are made of them. The rest of the head is the face's."""
+MASK_NAMES = (
+    "left_mouth",
+    "right_mouth",
+    "left_eye",
+    "right_eye",
+    "left_forehead",
+    "right_forehead",
+)
+"""Regions that have masks; the others are unions of them. The face has the rest of the head."""
 
 _MIDLINE_MM = 12.0
-"""Width over which left gives way to right."""
+"""Width of the blend from left to right."""
 _RAMP = (0.3, 0.8)
-"""Between upper lid (0) and brow (1): where the eyes' region gives way to the forehead's."""
+"""Between upper lid (0) and brow (1): where the region of the eyes blends into the forehead's."""
 _AT_LIDS = 0.8
-"""Of the generic mask of the eyes: from there on, lids and their margins too, all is theirs."""
+"""Value of the generic mask of the eyes from which on the region of the eyes is 1."""
 _PARTS = {
     "left_eyeball": "eyes",
     "right_eyeball": "eyes",
@@ -45,13 +52,13 @@ _PARTS = {
 
 
 def default_masks(generic: GenericHead) -> dict[str, Float[Array, " v"]]:
-    """(V,) in [0, 1] by name of MASKS: a partition of the face with soft borders.
+    """(V,) in [0, 1] by name of MASK_NAMES: a partition of the face with soft borders.
 
-    What lies behind the lips, the nostrils and the lids goes with them, as do teeth and tongue,
-    lashes and eyes. The border between eyes and forehead runs below the brows: across them, two
+    Surfaces behind lips, nostrils and lids belong to their regions, as do teeth and tongue, lashes
+    and eyes. The border between eyes and forehead runs below the brows: across them, two
     expressions would show two brows.
     """
-    regions, left = generic.regions, _left_share(generic.mesh.vertices[:, 0])
+    regions, left = generic.regions, _left_weight(generic.mesh.vertices[:, 0])
     mouth = np.maximum(regions["mouth"], regions["mouth_cavity"])
     socket = regions["eye_socket"] * (1 - regions["mouth_cavity"])
     eyes = np.maximum(np.minimum(regions["eyes"] / _AT_LIDS, 1.0), socket)
@@ -70,7 +77,7 @@ def default_masks(generic: GenericHead) -> dict[str, Float[Array, " v"]]:
         half = "eye" if name == "eyes" else name
         masks[f"left_{half}"] = left * mask / total
         masks[f"right_{half}"] = (1 - left) * mask / total
-    return {name: masks[name] for name in MASKS}
+    return {name: masks[name] for name in MASK_NAMES}
 
 
 def _above_lids(generic: GenericHead) -> Float[Array, " v"]:
@@ -82,14 +89,14 @@ def _above_lids(generic: GenericHead) -> Float[Array, " v"]:
             vertices[list(generic.polylines[f"{side}_{line}"])]
             for line in ("upper_eyelid", "eyebrow_lower")
         )
-        mine = sign * vertices[:, 0] >= 0
+        on_side = sign * vertices[:, 0] >= 0
         heights = [
             np.interp(sign * vertices[:, 0], *_rising(sign * line[:, 0], line[:, 1]))
             for line in (lid, brow)
         ]
         t = (vertices[:, 1] - heights[0]) / np.maximum(heights[1] - heights[0], 1.0)
         t = np.clip((t - _RAMP[0]) / (_RAMP[1] - _RAMP[0]), 0, 1)
-        above[mine] = (t * t * (3 - 2 * t))[mine]
+        above[on_side] = (t * t * (3 - 2 * t))[on_side]
     return above
 
 
@@ -99,18 +106,18 @@ def _rising(x: Float[Array, " n"], y: Float[Array, " n"]) -> tuple[Array, Array]
 
 
 def check_masks(masks: Mapping[str, object], vertices: int) -> dict[str, Float[Array, " v"]]:
-    """(V,) masks by name, in the order of MASKS, scaled down where they sum to more than 1.
+    """(V,) masks by name, in the order of MASK_NAMES, scaled down where they sum to more than 1.
 
-    A region that is left out has an empty mask: the face's weights hold there.
+    A region without a mask gets an empty one: the weights of the face hold there.
 
     Raises:
         InputError: an unknown name, another shape, values outside [0, 1].
     """
     for name in masks:
-        if name not in MASKS:
-            raise InputError("regions", f"names of {', '.join(MASKS)}", name)
+        if name not in MASK_NAMES:
+            raise InputError("regions", f"names of {', '.join(MASK_NAMES)}", name)
     checked = {}
-    for name in MASKS:
+    for name in MASK_NAMES:
         mask = check_array(f"region {name}", masks.get(name, np.zeros(vertices)), (vertices,))
         if mask.min(initial=0) < 0 or mask.max(initial=0) > 1:
             found = f"{mask.min():g} to {mask.max():g}"
@@ -120,7 +127,7 @@ def check_masks(masks: Mapping[str, object], vertices: int) -> dict[str, Float[A
     return {name: mask / total for name, mask in checked.items()}
 
 
-def _left_share(x: Float[Array, " v"]) -> Float[Array, " v"]:
+def _left_weight(x: Float[Array, " v"]) -> Float[Array, " v"]:
     """(V,) smoothly from 0 on the subject's right to 1 on the left."""
     t = np.clip(x / _MIDLINE_MM + 0.5, 0, 1)
     return t * t * (3 - 2 * t)

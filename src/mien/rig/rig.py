@@ -1,4 +1,4 @@
-"""A head that can be moved: photographed expressions, face units and gaze to one posed face."""
+"""The rig of a head: photographed expressions, face units and gaze to one posed face."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from mien.errors import InputError
 from mien.head import NEUTRAL, Head
 from mien.limits import UNIT_RANGE
 from mien.rig.basis import WEIGHT_RANGE, check_weights, outside_hull
-from mien.rig.contacts.contacts import Mechanics
+from mien.rig.deformer import FaceDeformer
 from mien.rig.followers import part_vertices
-from mien.rig.regions import AROUND, MASKS, check_masks, default_masks
-from mien.rig.shading import Openings, brightness_at
+from mien.rig.regions import ENCLOSING_REGIONS, MASK_NAMES, check_masks, default_masks
+from mien.rig.shading import OpeningMeter, brightness_at
 from mien.rig.sparse_offsets import add_mixture
 from mien.rig.state import FACE, FaceState, PosedFace
-from mien.rig.unit_decomposition import Explanations
+from mien.rig.unit_decomposition import UnitDecomposition
 
-REGIONS = (*MASKS, FACE)
-"""Those that have weights of their own in the end; the face's hold in the rest of the head."""
+WEIGHTED_REGIONS = (*MASK_NAMES, FACE)
+"""Regions that weights are resolved to; those of the face hold in the rest of the head."""
 
 
 class Rig:
@@ -38,9 +38,8 @@ class Rig:
             textures of different sizes.
 
     Source:
-        [Pighin 2002] sec. 6.1.1: consensus geometry, weights by region. Units, contacts and what of
-        an expression comes along with the units that explain it are ours
-        (docs/method/expressions.md).
+        [Pighin 2002] sec. 6.1.1: consensus geometry, weights by region. Units, contacts and the
+        residuals of expressions that follow the units are ours (docs/method/expressions.md).
     """
 
     def __init__(self, head: Head) -> None:
@@ -54,30 +53,30 @@ class Rig:
         self._neutral = np.asarray(head.mesh.vertices, np.float64)
         units = np.asarray(head.units, np.float64)
         masks = check_masks(head.regions or default_masks(generic), len(self._neutral))
-        by_mask = np.stack([masks[name] for name in MASKS], axis=1)
-        self._shares = np.column_stack([by_mask, 1 - by_mask.sum(axis=1)])
+        by_mask = np.stack([masks[name] for name in MASK_NAMES], axis=1)
+        self._masks = np.column_stack([by_mask, 1 - by_mask.sum(axis=1)])
         expressions = [head.expressions[name] for name in self.names]
         self._gaze = np.stack([item.gaze for item in expressions])
-        self._mechanics = Mechanics.of(generic, self._neutral, units)
+        self._deformer = FaceDeformer.of(generic, self._neutral, units)
         self.offsets = np.stack(
-            [self._still_eyes(item.vertices) - self._neutral for item in expressions]
+            [self._with_neutral_eyes(item.vertices) - self._neutral for item in expressions]
         )
-        self._explained = Explanations.of(
+        self._decomposition = UnitDecomposition.of(
             np.array([[item.units.get(n, 0.0) for n in self.unit_names] for item in expressions]),
             units,
             self.offsets,
             by_mask,
         )
-        self._openings = Openings.of(generic, self._neutral)
+        self._openings = OpeningMeter.of(generic, self._neutral)
         self._shading = head.shading
         self._photographed = np.stack([item.vertices for item in expressions])
         openings = np.stack([self._openings.measure(item) for item in self._photographed])
-        self._photographed_light = brightness_at(openings, self._shading)
+        self._photographed_brightness = brightness_at(openings, self._shading)
         self._shaded = _shaded_parts(generic)
-        # Where eyes look in a photograph has nothing to do with the units that it shows.
-        self._skin_shares = self._shares.copy()
-        for eyeball in self._mechanics.look.eyeballs:
-            self._skin_shares[eyeball.vertices] = 0
+        # Gaze in a photograph is independent of the units that it shows.
+        self._skin_masks = self._masks.copy()
+        for eyeball in self._deformer.gaze_model.eyeballs:
+            self._skin_masks[eyeball.vertices] = 0
 
     def evaluate(self, state: FaceState, *, contacts: bool = True) -> PosedFace:
         """The face in this state.
@@ -85,7 +84,8 @@ class Rig:
         One expression at weight 1 is that expression exactly, as photographed.
 
         Args:
-            contacts: whether lids ride on the eyes and lips do not pass through each other.
+            state: expressions, units and gaze.
+            contacts: whether to resolve contacts of lids, eyes and lips.
 
         Raises:
             InputError: an unknown region, expression or unit; weights outside [-0.5, 1.5].
@@ -102,24 +102,25 @@ class Rig:
         *,
         contacts: bool = True,
     ) -> PosedFace:
-        """What evaluate makes of a state, from its numbers; they are not checked.
+        """As evaluate, from arrays that are not checked.
 
         Args:
-            by_region: weights of the expressions in each of REGIONS.
+            by_region: weights of the expressions in each of WEIGHTED_REGIONS.
             units: weights.
             gaze: yaw and pitch, radians.
+            contacts: as for evaluate.
         """
-        weights = self._shares @ by_region
+        weights = self._masks @ by_region
         moved = bool(units.any() or gaze.any())
         if not moved and _one_expression(by_region):
             return self._as_photographed(weights)
         vertices = self._mixed(weights)
-        driven = self._explained.driven(units) * np.clip(by_region[:, :1], 0, 1)
-        if driven.any():
-            along = self._skin_shares @ np.column_stack([-driven.sum(axis=1), driven])
-            add_mixture(along[:, 1:], self._explained.left_over[1:], vertices)
-            weights += along
-        vertices = self._mechanics.applied(vertices, units, gaze, contacts=contacts)
+        following = self._decomposition.expression_weights(units) * np.clip(by_region[:, :1], 0, 1)
+        if following.any():
+            added = self._skin_masks @ np.column_stack([-following.sum(axis=1), following])
+            add_mixture(added[:, 1:], self._decomposition.residuals[1:], vertices)
+            weights += added
+        vertices = self._deformer.deform(vertices, units, gaze, contacts=contacts)
         return PosedFace(vertices, weights, self._brightness(vertices, weights))
 
     def mixed(
@@ -130,14 +131,14 @@ class Rig:
         turn: Float[Array, "2 2"] | None = None,
         contacts: bool = True,
     ) -> PosedFace:
-        """The face whose every vertex mixes the photographed expressions by weights of its own.
+        """The face with weights of the photographed expressions for every vertex.
 
         One expression at weight 1 everywhere is that expression exactly, as photographed.
 
         Args:
-            weights: (V, K) that sum to 1; alike within an eyeball.
-            offsets: (V, 3) mm, how the mixed face moves on.
-            turn: radians, yaw and pitch by which the left and the right eye turn on.
+            weights: (V, K) that sum to 1; equal within an eyeball.
+            offsets: (V, 3) mm, added to the mixed face.
+            turn: radians, yaw and pitch added to the left and the right eye.
             contacts: as for evaluate.
 
         Raises:
@@ -149,25 +150,25 @@ class Rig:
             return self._as_photographed(weights)
         vertices = self._mixed(weights)
         if turn is not None:
-            self._mechanics.look.turn(vertices, check_array("turn", turn, (2, 2)))
+            self._deformer.gaze_model.turn(vertices, check_array("turn", turn, (2, 2)))
         if offsets is not None:
             vertices += check_array("offsets", offsets, vertices.shape)
         still = np.zeros(len(self.unit_names))
-        vertices = self._mechanics.applied(vertices, still, contacts=contacts)
+        vertices = self._deformer.deform(vertices, still, contacts=contacts)
         return PosedFace(vertices, weights, self._brightness(vertices, weights))
 
     def mask(self, region: str) -> Float[Array, " v"]:
-        """(V,) in [0, 1]: how far each vertex obeys this region's weights.
+        """(V,) in [0, 1]: influence of this region's weights on each vertex.
 
         Raises:
             InputError: an unknown region.
         """
-        _check_known("region", region, AROUND)
-        inside = [region in (name, *AROUND[name]) for name in MASKS]
-        return self._shares[:, [*inside, region == FACE]].sum(axis=1)
+        _check_known("region", region, ENCLOSING_REGIONS)
+        inside = [region in (name, *ENCLOSING_REGIONS[name]) for name in MASK_NAMES]
+        return self._masks[:, [*inside, region == FACE]].sum(axis=1)
 
     def hull_notes(self, state: FaceState) -> tuple[str, ...]:
-        """What a state asks for beyond the expressions that were photographed, by its regions.
+        """Notes on weights of a state that extrapolate the photographed expressions, by region.
 
         Raises:
             InputError: as evaluate.
@@ -181,7 +182,7 @@ class Rig:
     def _region_weights(
         self, expressions: Mapping[str, Mapping[str, float]]
     ) -> Float[Array, "r k"]:
-        """(R, K) weights in each of REGIONS."""
+        """(R, K) weights in each of WEIGHTED_REGIONS."""
         rows = region_rows(tuple(expressions))
         own = [self._weights({}), *(self._weights(given) for given in expressions.values())]
         return np.array(own)[rows]
@@ -211,10 +212,10 @@ class Rig:
             weights[self.unit_names.index(name)] = weight
         return weights
 
-    def _still_eyes(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
-        """The expression with its eyeballs as in neutral: they are turned, not mixed."""
+    def _with_neutral_eyes(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
+        """The expression with its eyeballs as in neutral: they are rotated, not mixed."""
         still = np.array(vertices, np.float64)
-        for eyeball in self._mechanics.look.eyeballs:
+        for eyeball in self._deformer.gaze_model.eyeballs:
             still[eyeball.vertices] = self._neutral[eyeball.vertices]
         return still
 
@@ -226,39 +227,40 @@ class Rig:
     def _mixed(self, weights: Float[Array, "v k"]) -> Float[Array, "v 3"]:
         vertices = self._neutral.copy()
         add_mixture(weights[:, 1:], self.offsets[1:], vertices)
-        self._look_as_photographed(vertices, weights)
+        self._turn_eyes_as_photographed(vertices, weights)
         return vertices
 
-    def _look_as_photographed(
+    def _turn_eyes_as_photographed(
         self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
     ) -> None:
-        """Turns the eyes in place by the mean of where they look in the photographs."""
-        look = self._mechanics.look
-        balls = [eyeball.vertices[0] for eyeball in look.eyeballs]
-        look.turn(vertices, np.einsum("sk,ksa->sa", weights[balls], self._gaze))
+        """Rotates the eyes in place by the weighted mean of the gaze in the photographs."""
+        gaze_model = self._deformer.gaze_model
+        balls = [eyeball.vertices[0] for eyeball in gaze_model.eyeballs]
+        gaze_model.turn(vertices, np.einsum("sk,ksa->sa", weights[balls], self._gaze))
 
     def _brightness(
         self, vertices: Float[Array, "v 3"], weights: Float[Array, "v k"]
     ) -> Float[Array, " v"]:
-        """[Pighin 2002] sec. 5.2.4, over the shadow that is in the mixed textures already."""
+        """(V,) shadow ([Pighin 2002] sec. 5.2.4), relative to that in the mixed textures."""
         now = brightness_at(self._openings.measure(vertices), self._shading)
         brightness = np.ones(len(vertices))
         for column, part in enumerate(self._shaded):
-            there = weights[part[0]] @ self._photographed_light[:, column]
+            there = weights[part[0]] @ self._photographed_brightness[:, column]
             brightness[part] = now[column] / max(float(there), 0.1)
         return brightness
 
 
 def region_rows(regions: Sequence[str]) -> Int[Array, " r"]:
-    """(R,) which of these regions each of REGIONS obeys, counted from 1; 0 for none.
+    """(R,) for each of WEIGHTED_REGIONS the nearest of these, counted from 1; 0 for none.
 
     Raises:
         InputError: an unknown region.
     """
     for region in regions:
-        _check_known("region", region, AROUND)
+        _check_known("region", region, ENCLOSING_REGIONS)
     nearest = (
-        next((name for name in (own, *AROUND[own]) if name in regions), None) for own in REGIONS
+        next((name for name in (own, *ENCLOSING_REGIONS[own]) if name in regions), None)
+        for own in WEIGHTED_REGIONS
     )
     return np.array([0 if name is None else 1 + regions.index(name) for name in nearest])
 

@@ -16,24 +16,24 @@ EYES, TEETH = "eyes", "teeth"
 Polynomial = tuple[float, float, float]
 """c0 + c1 o + c2 o^2, the brightness at an opening o."""
 
-MOST_OPEN = {EYES: 1.6, TEETH: 0.4}
-"""Beyond, brightness stays."""
+MAX_OPENING = {EYES: 1.6, TEETH: 0.4}
+"""Openings are clamped to this; beyond it brightness is constant."""
 _PRIOR_SD = (0.15, 0.6, 0.6)
-"""How far a person's coefficients lie off the usual ones."""
+"""Prior standard deviation of the coefficients."""
 _NOISE = 0.08
-"""Of a measured brightness."""
+"""Standard deviation of a measured brightness ratio."""
 _SCALE_SD = 0.01
-_RANGE = (0.25, 1.5)
+_BRIGHTNESS_RANGE = (0.25, 1.5)
 
 
 @dataclass(frozen=True)
-class Openings:
-    """How far eyes and mouth are open, for heads of one topology and one person.
+class OpeningMeter:
+    """Measures how far eyes and mouth are open, for one person.
 
     Attributes:
         lids: vertex pairs in the middle of the left and the right eye, (2, 2).
         lips: the pair in the middle of the mouth.
-        corners: the mouth's.
+        corners: of the mouth.
         neutral: (2,) mm between the lids in neutral.
     """
 
@@ -43,7 +43,7 @@ class Openings:
     neutral: Float[Array, " 2"]
 
     @classmethod
-    def of(cls, generic: GenericHead, vertices: Float[Array, "v 3"]) -> Openings:
+    def of(cls, generic: GenericHead, vertices: Float[Array, "v 3"]) -> OpeningMeter:
         """For a person with these neutral vertices, (V, 3) mm."""
         lines = generic.polylines
         lids = tuple(
@@ -68,30 +68,30 @@ def brightness_at(
     """Brightness of the left eye, the right eye and the teeth at these openings."""
     parts = (EYES, EYES, TEETH)
     c0, c1, c2 = np.array([polynomials[part] for part in parts]).T
-    o = np.clip(openings, 0, [MOST_OPEN[part] for part in parts])
-    return np.clip(c0 + o * (c1 + o * c2), *_RANGE)
+    o = np.clip(openings, 0, [MAX_OPENING[part] for part in parts])
+    return np.clip(c0 + o * (c1 + o * c2), *_BRIGHTNESS_RANGE)
 
 
 def fit_polynomial(part: str, measured: Sequence[tuple[float, float, float]]) -> Polynomial:
     """The polynomial of highest posterior, given how bright photos show a part.
 
     Args:
-        part: "eyes" or "teeth", whose usual polynomial is the prior's mean.
-        measured: an opening, another one, and the brightness at the first over that at the other,
-            of each pair of photos.
+        part: "eyes" or "teeth"; its default polynomial is the prior mean.
+        measured: for each pair of photos the two openings and the ratio of the first brightness
+            to the second.
 
     Source:
-        [Pighin 2002] sec. 5.2.4; few photos do not tell three coefficients, hence the prior.
+        [Pighin 2002] sec. 5.2.4; few photos do not determine three coefficients, hence the prior.
     """
-    usual, spread = np.array(SHADING[part]), np.array(_PRIOR_SD)
+    mean, spread = np.array(SHADING[part]), np.array(_PRIOR_SD)
     table = np.array(measured, float).reshape(-1, 3)
-    at, other = (np.clip(table[:, k], 0, MOST_OPEN[part]) for k in (0, 1))
+    at, other = (np.clip(table[:, k], 0, MAX_OPENING[part]) for k in (0, 1))
     # ratio = p(o) / p(other): linear in the coefficients once multiplied out.
     rows = at[:, None] ** np.arange(3) - table[:, 2:] * other[:, None] ** np.arange(3)
-    # Ratios do not tell the scale, which is that of the usual polynomial, wide open.
-    wide = MOST_OPEN[part] ** np.arange(3)
+    # Ratios leave the scale undetermined: it is that of the prior mean at the largest opening.
+    wide = MAX_OPENING[part] ** np.arange(3)
     normal = rows.T @ rows / _NOISE**2 + np.outer(wide, wide) / _SCALE_SD**2 + np.diag(spread**-2)
-    right = usual / spread**2 + wide * (wide @ usual) / _SCALE_SD**2
+    right = mean / spread**2 + wide * (wide @ mean) / _SCALE_SD**2
     c0, c1, c2 = np.linalg.solve(normal, right).tolist()
     return c0, c1, c2
 

@@ -1,4 +1,4 @@
-"""Sums of offsets, touching only the vertices that they move."""
+"""Weighted sums of sparse vertex offsets."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from mien.numeric.kernels.jit import njit
 
 @dataclass(frozen=True)
 class SparseOffsets:
-    """U ways to move a head, most of which move few of its vertices.
+    """Offsets of U units, each of which moves few vertices.
 
     Attributes:
-        starts: (U + 1,) where each one's entries begin, and where the last one's end.
-        vertices: (N,) unsigned, that an entry moves.
+        starts: (U + 1,) where the entries of each unit begin, and where the last ones end.
+        vertices: (N,) unsigned, the vertex of each entry.
         moves: (N, 3) mm at weight 1.
     """
 
@@ -27,14 +27,14 @@ class SparseOffsets:
     @classmethod
     def of(cls, offsets: Float[Array, "u v 3"]) -> SparseOffsets:
         """From (U, V, 3) mm."""
-        way, vertices = np.nonzero(np.any(offsets, axis=2))
-        starts = np.searchsorted(way, np.arange(len(offsets) + 1))
-        moves = np.asarray(offsets[way, vertices], np.float64)
-        # Indices that may be negative would be looked at one by one.
+        unit, vertices = np.nonzero(np.any(offsets, axis=2))
+        starts = np.searchsorted(unit, np.arange(len(offsets) + 1))
+        moves = np.asarray(offsets[unit, vertices], np.float64)
+        # Unsigned: the kernel then skips the check for negative indices.
         return cls(frozen(starts), frozen(vertices.astype(np.uint32)), frozen(moves))
 
     def add(self, weights: Float[Array, " u"], vertices: Float[Array, "v 3"]) -> None:
-        """Moves vertices, (V, 3) mm, in place, each way by its weight."""
+        """Moves vertices, (V, 3) mm, in place by the weighted units."""
         _add(weights, self.starts, self.vertices, self.moves, vertices)
 
 
@@ -42,7 +42,7 @@ class SparseOffsets:
 def add_mixture(
     weights: Float[Array, "v k"], offsets: Float[Array, "k v 3"], vertices: Float[Array, "v 3"]
 ) -> None:
-    """Moves vertices, (V, 3) mm, in place by offsets that each vertex mixes its own way."""
+    """Moves vertices, (V, 3) mm, in place by offsets with weights for each vertex."""
     for k in range(len(offsets)):
         for v in range(len(vertices)):
             for axis in range(3):
@@ -51,10 +51,10 @@ def add_mixture(
 
 @njit(cache=True, nogil=True)
 def _add(weights: Array, starts: Array, moved: Array, moves: Array, vertices: Array) -> None:
-    for way in range(len(weights)):
-        weight = weights[way]
+    for unit in range(len(weights)):
+        weight = weights[unit]
         if weight == 0:
             continue
-        for n in range(starts[way], starts[way + 1]):
+        for n in range(starts[unit], starts[unit + 1]):
             for axis in range(3):
                 vertices[moved[n], axis] += weight * moves[n, axis]

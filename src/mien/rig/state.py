@@ -1,4 +1,4 @@
-"""What a face does at one moment, and the surface that follows from it."""
+"""The state of a face, and the posed surface that follows from it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FACE = "face"
 
 @dataclass(frozen=True)
 class Gaze:
-    """Where the eyes look, radians from straight ahead.
+    """Direction of gaze, radians from straight ahead.
 
     Attributes:
         yaw: positive to the subject's left.
@@ -32,12 +32,12 @@ class Gaze:
 
 @dataclass(frozen=True)
 class FaceState:
-    """What a face does at one moment.
+    """Weights of expressions and units, and gaze.
 
     Attributes:
         expressions: weights of photographed expressions by region: {"face": {"joy": 0.6}} holds
             everywhere, {"mouth": {"anger": 0.4}} instead of it in the mouth, {"left_mouth": ...}
-            instead of both in its left half. What is missing to 1 is neutral's.
+            instead of both in its left half. The rest to 1 is neutral's.
         units: weights of face units by name; 0 to 1 is their usual range, all that a rig takes is
             mien.limits.UNIT_RANGE.
         gaze: where the eyes look.
@@ -50,7 +50,7 @@ class FaceState:
 
 @dataclass(frozen=True)
 class PosedFace:
-    """The consensus geometry, and whose texture shows how much at every vertex.
+    """The consensus geometry, with the weight of each texture at every vertex.
 
     Attributes:
         vertices: (V, 3) mm, head space.
@@ -59,7 +59,7 @@ class PosedFace:
         brightness: (V,) factor on the colours: eyes and teeth in the shadow of lids and lips.
 
     Args:
-        finite: look for NaN and infinity; not needed for what follows from finite numbers.
+        finite: check for NaN and infinity; not needed for what was computed from finite numbers.
 
     Raises:
         InputError: shape, not finite.

@@ -1,10 +1,8 @@
-"""The generic head's face units carried over to a person's head.
+"""Transfer of the generic head's face units to a person's head.
 
-The generic unit says how every edge of the mesh changes. The person's unit is the one whose edges
-change likewise, as the person's head is stretched against the generic one around that edge: with
-J the local affine map from the generic head to the person's, an edge change (U_i - U_j) becomes
-J (U_i - U_j). Vertices that the generic unit leaves alone are pinned; the others follow from one
-sparse least-squares problem a unit.
+With J the local affine map from the generic head to the person's, the difference U_i - U_j of a
+unit's offsets along an edge becomes J (U_i - U_j). Vertices that the generic unit does not move are
+fixed; the others are the solution of one sparse least-squares problem a unit.
 """
 
 from __future__ import annotations
@@ -14,15 +12,15 @@ from scipy.sparse import coo_matrix, csr_matrix, diags
 
 from mien.arrays import Array, Bool, Float, Int, check_array
 from mien.assets.generic import GenericHead
-from mien.rig.contacts.margins import full_path, skin_edges
 from mien.rig.followers import Followers, part_vertices
+from mien.rig.skin_paths import shortest_path, skin_edges
 
-_REACH_MM = 12.0
-"""Standard deviation of the neighbourhood over which the stretch of a head is judged."""
+_SIGMA_MM = 12.0
+"""Standard deviation of the neighbourhood over which the local stretch is estimated."""
 _RIDGE = 0.05
-"""Share of the whole head's stretch in it: a flat neighbourhood tells nothing across itself."""
+"""Ridge towards the whole head's stretch: a flat neighbourhood does not determine its normal's."""
 _STILL_MM = 1e-4
-_LEAST_WEIGHT = 0.02
+_MIN_WEIGHT = 0.02
 _LINK = 1.0
 """Weight of a link across mouth or eyes; an edge of an equilateral triangle weighs 0.58."""
 _OPENINGS = (
@@ -39,9 +37,10 @@ def transfer_units(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float
     """(52, V, 3) float32 mm: what each generic unit adds to this head's vertices at weight 1.
 
     Exact for every affine image of the generic head: its units are the generic ones, mapped alike.
-    Lids and lips are not brought into contact here (see lids, lips).
+    Contacts of lids and lips are not resolved here (see rig.contacts).
 
     Args:
+        generic: the head whose units are transferred.
         vertices: (V, 3) mm, head space, the generic topology; the neutral face.
 
     Raises:
@@ -49,24 +48,24 @@ def transfer_units(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float
 
     Source:
         after Sumner and Popovic, Deformation transfer for triangle meshes, SIGGRAPH 2004; differs
-        in that gradients live on the generic mesh, whose triangles are all sound, and are
-        conjugated with the stretch between the heads, so that amplitudes follow its proportions.
+        in that gradients are those of the generic mesh, which has no degenerate triangles, mapped
+        by the stretch between the heads, so that amplitudes follow its proportions.
     """
     vertices = check_array("vertices", vertices, generic.mesh.vertices.shape)
     stretch = local_stretch(generic, vertices)
     units = generic.unit_offsets.astype(np.float64)
-    pushed = np.einsum("vij,kvj->kvi", stretch, units)
+    stretched = np.einsum("vij,kvj->kvi", stretch, units)
     skin = part_vertices(generic, "skin")
     result = np.zeros_like(units)
-    result[:, skin] = _integrated(generic, skin, stretch, units, pushed)
-    left = result - pushed
+    result[:, skin] = _integrated(generic, skin, stretch, units, stretched)
+    deviation = result - stretched
     followers = Followers.of(generic)
-    result[:, followers.vertices] = pushed[:, followers.vertices] + followers.carried(left)
+    result[:, followers.vertices] = stretched[:, followers.vertices] + followers.carried(deviation)
     for name in _RIGID:
         part = part_vertices(generic, name)
         linear = _affine(generic.mesh.vertices[part], vertices[part])
         result[:, part] = units[:, part] @ linear.T
-    _follow_jaw(generic, units, left, result)
+    _follow_jaw(generic, units, deviation, result)
     return result.astype(np.float32)
 
 
@@ -74,7 +73,7 @@ def local_stretch(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[
     """The linear part of the affine map from the generic head to this one around every vertex.
 
     Fitted to the skin by least squares, weighted by a Gaussian of the distance on the generic head
-    and leaning a little towards the affine map of the whole head.
+    with a ridge towards the affine map of the whole head.
     """
     from scipy.spatial import cKDTree
 
@@ -82,8 +81,8 @@ def local_stretch(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[
     skin = part_vertices(generic, "skin")
     whole = _affine(source[skin], vertices[skin])
     tree = cKDTree(source[skin])
-    pairs = tree.sparse_distance_matrix(cKDTree(source), 2 * _REACH_MM, output_type="coo_matrix")
-    near = np.exp(-0.5 * (pairs.data / _REACH_MM) ** 2)
+    pairs = tree.sparse_distance_matrix(cKDTree(source), 2 * _SIGMA_MM, output_type="coo_matrix")
+    near = np.exp(-0.5 * (pairs.data / _SIGMA_MM) ** 2)
     weights = csr_matrix((near, (pairs.col, pairs.row)), (len(source), len(skin)))
     left = (vertices - source @ whole.T)[skin]
     moments = _moments(weights, source[skin], left)
@@ -118,7 +117,7 @@ def _integrated(
     skin: Int[Array, " s"],
     stretch: Float[Array, "v 3 3"],
     units: Float[Array, "k v 3"],
-    pushed: Float[Array, "k v 3"],
+    stretched: Float[Array, "k v 3"],
 ) -> Float[Array, "k s 3"]:
     """The skin's offsets whose differences along edges come nearest to the stretched ones."""
     from scipy.sparse.linalg import splu
@@ -127,7 +126,7 @@ def _integrated(
     local = stretch[skin]
     bend = (laplacian @ local.reshape(-1, 9)).reshape(-1, 3, 3)
     result = np.zeros((len(units), len(skin), 3))
-    for unit, (raw, moved) in enumerate(zip(units[:, skin], pushed[:, skin], strict=True)):
+    for unit, (raw, moved) in enumerate(zip(units[:, skin], stretched[:, skin], strict=True)):
         free = np.flatnonzero(np.abs(raw).max(axis=1) > _STILL_MM)
         if not len(free):
             continue
@@ -169,19 +168,19 @@ def _edges(generic: GenericHead) -> tuple[Int[Array, "e 2"], Float[Array, " e"]]
         area = np.linalg.norm(np.cross(to_a, to_b), axis=1)
         cotangent = (to_a * to_b).sum(axis=1) / area
         pairs.append(triangles[:, [a, b]])
-        weights.append(np.maximum(cotangent, _LEAST_WEIGHT) / 2)
+        weights.append(np.maximum(cotangent, _MIN_WEIGHT) / 2)
     return np.concatenate(pairs), np.concatenate(weights)
 
 
 def _links(generic: GenericHead) -> Int[Array, "l 2"]:
-    """Pairs of vertices across mouth and eyes: how far these open and close carries over, too."""
+    """Pairs of vertices across mouth and eyes, so that their opening is transferred too."""
     from scipy.spatial import cKDTree
 
     places = generic.mesh.vertices
     edges = skin_edges(generic, places)
     pairs = []
     for opening in _OPENINGS:
-        upper, lower = (full_path(edges, generic.polylines[name])[1:-1] for name in opening)
+        upper, lower = (shortest_path(edges, generic.polylines[name])[1:-1] for name in opening)
         for line, other in ((upper, lower), (lower, upper)):
             nearest = other[cKDTree(places[other]).query(places[line])[1]]
             pairs.append(np.column_stack([line, nearest]))
@@ -191,14 +190,14 @@ def _links(generic: GenericHead) -> Int[Array, "l 2"]:
 def _follow_jaw(
     generic: GenericHead,
     units: Float[Array, "k v 3"],
-    left: Float[Array, "k v 3"],
+    deviation: Float[Array, "k v 3"],
     result: Float[Array, "k v 3"],
 ) -> None:
-    """Lower teeth and tongue go along where the chin moves unlike a stretched generic one."""
+    """Adds to lower teeth and tongue the chin's deviation from the stretched generic motion."""
     chin = _chin(generic)
     teeth = part_vertices(generic, "lower_teeth")
     jaw = np.abs(units[:, teeth]).max(axis=(1, 2)) > 1.0
-    extra = left[:, chin].mean(axis=1)
+    extra = deviation[:, chin].mean(axis=1)
     for name in _JAW_PARTS:
         result[np.ix_(jaw, part_vertices(generic, name))] += extra[jaw, None]
 

@@ -14,7 +14,7 @@ from mien.assets.generic import load_generic_head
 from mien.errors import FileFormatError
 from mien.head import Expression, Head
 from mien.io.head.head_folder import load_head, save_head
-from mien.rig.regions import MASKS, default_masks
+from mien.rig.regions import MASK_NAMES, default_masks
 from mien.rig.rig import Rig
 from mien.rig.state import FaceState
 
@@ -53,8 +53,8 @@ def raised(head: Head, region: str) -> Array:
 
 def test_masks_round_trip(masked: Head, folder: Path) -> None:
     found = load_head(folder).regions
-    assert tuple(found) == MASKS
-    off = np.abs([found[name] - masked.regions[name] for name in MASKS]).max(axis=0)
+    assert tuple(found) == MASK_NAMES
+    off = np.abs([found[name] - masked.regions[name] for name in MASK_NAMES]).max(axis=0)
     assert (off <= 0.02).mean() > 0.95
     assert off.max() < 0.2, "between the smallest triangles, in the eye sockets"
 
@@ -74,7 +74,7 @@ def test_a_painted_mask_changes_the_region(masked: Head, folder: Path) -> None:
     """White all over, in another size and kind of picture: that region is the whole head."""
     before = raised(load_head(folder), "left_forehead")
     assert before.min() < 0.01
-    for name in MASKS:
+    for name in MASK_NAMES:
         Image.new("L", (64, 48), 255 * (name == "left_forehead")).save(
             folder / "regions" / f"{name}.png"
         )
@@ -85,7 +85,7 @@ def test_a_painted_mask_changes_the_region(masked: Head, folder: Path) -> None:
 
 
 def test_where_masks_overlap_they_share(folder: Path) -> None:
-    for name in MASKS:
+    for name in MASK_NAMES:
         white = 255 * (name in ("left_eye", "right_eye"))
         Image.new("L", (16, 16), white).save(folder / "regions" / f"{name}.png")
     np.testing.assert_allclose(raised(load_head(folder), "left_eye"), 0.5, atol=1e-6)
@@ -95,7 +95,7 @@ def test_a_missing_mask_leaves_its_place_to_the_face(folder: Path) -> None:
     for name in ("left_mouth", "right_mouth"):
         (folder / "regions" / f"{name}.png").unlink()
     head = load_head(folder)
-    assert set(head.regions) == set(MASKS) - {"left_mouth", "right_mouth"}
+    assert set(head.regions) == set(MASK_NAMES) - {"left_mouth", "right_mouth"}
     np.testing.assert_allclose(raised(head, "mouth"), 0, atol=1e-6)
     lip = int(np.searchsorted(SKIN, GENERIC.vertex_of("upper_lip_outer.4")))
     assert raised(head, "face")[lip] == pytest.approx(1, abs=1e-6)
@@ -119,4 +119,4 @@ def test_a_broken_mask_is_named(folder: Path, content: bytes | None) -> None:
 
 def test_other_files_beside_the_masks_do_no_harm(folder: Path) -> None:
     (folder / "regions" / "nose.png").write_bytes(b"mine")
-    assert tuple(load_head(folder).regions) == MASKS
+    assert tuple(load_head(folder).regions) == MASK_NAMES

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mien.animate.channels import REGIONS
+from mien.animate.channels import REGION_NAMES
 from mien.animate.layers import GENERATORS
 from mien.io.timeline.fap_table import PARAMETERS
 from mien.io.timeline.timeline_file import check_timeline
@@ -33,7 +33,7 @@ def test_the_example_loads(tmp_path: Path) -> None:
 
 
 def test_all_regions_and_parameters_are_documented() -> None:
-    for region in REGIONS:
+    for region in REGION_NAMES:
         assert f"`{region}`" in PAGE
     for parameter in PARAMETERS:
         assert f"| {parameter.number} {parameter.name} |" in PAGE

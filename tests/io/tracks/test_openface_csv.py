@@ -23,9 +23,9 @@ from mien.io.tracks.openface_csv import (
     pose_angles,
     save_openface,
 )
-from mien.pipelines.explained import units_of
-from mien.rig.gaze import LOOK_UNITS
+from mien.rig.gaze import EYE_LOOK_UNITS
 from mien.rig.state import Gaze
+from mien.rig.unit_decomposition import units_from_state
 from mien.track.state import Layout
 from tracks import LAYOUT, random_state, random_track, track_of
 
@@ -106,7 +106,7 @@ def test_eye_0_is_the_pictures_leftmost() -> None:
     first, second = gaze_vectors(FACING, Gaze(), {"eyeLookInRight": 0.5})
     np.testing.assert_allclose(first, (np.sin(LOOK_RANGE / 2), 0, -np.cos(LOOK_RANGE / 2)))
     np.testing.assert_allclose(second, (0, 0, -1))
-    up = gaze_vectors(FACING, Gaze(0, 0.1), {unit: 1 for unit in LOOK_UNITS if "Up" in unit})
+    up = gaze_vectors(FACING, Gaze(0, 0.1), {unit: 1 for unit in EYE_LOOK_UNITS if "Up" in unit})
     np.testing.assert_allclose(np.arctan2(-up[:, 1], -up[:, 2]), LOOK_RANGE + 0.1)
 
 
@@ -149,7 +149,7 @@ def test_photographed_expressions_count_by_their_units(
     layout = Layout(("mouth",), ("neutral", "joy"))
     state = replace(random_state(rng, layout), weights=np.array([[0.5, 0.5]]))
     track = track_of([state], rng, layout=layout)
-    save_openface(tmp_path / "a.csv", track, units_of=lambda state: units_of(head, state))
+    save_openface(tmp_path / "a.csv", track, units_of=lambda state: units_from_state(head, state))
     assert float(rows_of(tmp_path / "a.csv")[0]["AU12_r"]) == pytest.approx(2.0)
 
 

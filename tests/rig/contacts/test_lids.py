@@ -9,8 +9,8 @@ from mien.assets.generic import load_generic_head
 from mien.camera import Camera
 from mien.render.shade import rasterize_mesh
 from mien.rig.contacts.lids import Lids, resolve_lids
-from mien.rig.contacts.margins import full_path, skin_edges
 from mien.rig.gaze import SIDES
+from mien.rig.skin_paths import shortest_path, skin_edges
 
 if TYPE_CHECKING:
     from conftest import Rigged
@@ -38,7 +38,8 @@ def eyeball_pixels(vertices: np.ndarray, side: str, yaw: float, pitch: float) ->
 def test_the_margin_is_one_closed_path_of_28_edges() -> None:
     edges = skin_edges(GENERIC, GENERIC.mesh.vertices)
     upper, lower = (
-        full_path(edges, GENERIC.polylines[f"left_{which}_eyelid"]) for which in ("upper", "lower")
+        shortest_path(edges, GENERIC.polylines[f"left_{which}_eyelid"])
+        for which in ("upper", "lower")
     )
     assert (upper[0], upper[-1]) == (lower[0], lower[-1])
     assert len(set(upper) | set(lower)) == len(upper) + len(lower) - 2 == 28
@@ -61,8 +62,8 @@ def test_open_lids_show_the_eye(rigged: Rigged) -> None:
 @pytest.mark.parametrize("weight", [0.5, 1.0])
 def test_no_lid_enters_the_eyeball(rigged: Rigged, name: str, weight: float) -> None:
     posed = rigged.posed(**{name: weight})
-    for lids in rigged.mechanics.contacts.lids:
-        depth = (lids.least - lids.places(posed)[:, 2]) * lids.eyeball.radius
+    for lids in rigged.deformer.contacts.lids:
+        depth = (lids.min_radius - lids.spherical(posed)[:, 2]) * lids.eyeball.radius
         assert depth.max() < 0.15
 
 
@@ -73,18 +74,18 @@ def test_no_lid_enters_the_eyeball(rigged: Rigged, name: str, weight: float) -> 
 def test_in_mixtures_lids_meet_and_do_not_pass(rigged: Rigged, others: tuple[str, ...]) -> None:
     weights = BLINK | {f"{name}{side}": 1.0 for name in others for side in ("Left", "Right")}
     living = rigged.living(**weights)
-    for side, lids in zip(SIDES, rigged.mechanics.contacts.lids, strict=True):
-        places = lids.places(living)
+    for side, lids in zip(SIDES, rigged.deformer.contacts.lids, strict=True):
+        places = lids.spherical(living)
         overlap = lids.overlap(places) * lids.eyeball.radius
-        assert (places[:, 2] > lids.least - 1e-5).all()
+        assert (places[:, 2] > lids.min_radius - 1e-5).all()
         assert overlap.max() < 1.0
         assert eyeball_pixels(living, side, 0, 0) == 0
 
 
 def test_a_half_blink_leaves_half_an_opening(rigged: Rigged) -> None:
-    lids = rigged.mechanics.contacts.lids[0]
+    lids = rigged.deformer.contacts.lids[0]
     opening = [
-        -lids.overlap(lids.places(rigged.living(eyeBlinkLeft=weight))).min()
+        -lids.overlap(lids.spherical(rigged.living(eyeBlinkLeft=weight))).min()
         for weight in (0.0, 0.5, 1.0)
     ]
     assert 0.35 < opening[1] / opening[0] < 0.65
@@ -92,13 +93,13 @@ def test_a_half_blink_leaves_half_an_opening(rigged: Rigged) -> None:
 
 
 def test_lids_without_contact_are_left_alone(rigged: Rigged) -> None:
-    for lids in rigged.mechanics.contacts.lids:
+    for lids in rigged.deformer.contacts.lids:
         assert resolve_lids(lids, rigged.neutral) is None
 
 
 def resolved_by_rounds(lids: Lids, vertices: np.ndarray) -> np.ndarray:
     """(L, 3) mm: either lid gives way by half, over and over; then out of the eyeball."""
-    places = before = lids.places(vertices)
+    places = before = lids.spherical(vertices)
     pressed = np.zeros(lids.upper)
     for _ in range(4):
         too_far = np.maximum(lids.overlap(places) - lids.full_overlap, 0)
@@ -110,15 +111,15 @@ def resolved_by_rounds(lids: Lids, vertices: np.ndarray) -> np.ndarray:
     firmly = np.minimum(pressed * lids.eyeball.radius / 0.5, 1)
     off = (wanted + lids.full_overlap * 0.15 / 0.35 - upper[:, 2]) * firmly
     places[:, 2] += lids.spread(places, off) * lids.on_upper
-    places[:, 2] = np.maximum(places[:, 2], lids.least)
-    return lids.at(places) - lids.at(before)
+    places[:, 2] = np.maximum(places[:, 2], lids.min_radius)
+    return lids.from_spherical(places) - lids.from_spherical(before)
 
 
 @pytest.mark.parametrize(("blink", "squint"), [(1.0, 1.0), (0.8, 0.6), (0.4, 0.0), (1.4, 0.0)])
 def test_lids_give_way_by_half_each(rigged: Rigged, blink: float, squint: float) -> None:
     weights = {"eyeBlinkLeft": blink, "eyeBlinkRight": blink, "eyeSquintLeft": squint}
     posed = rigged.posed(**weights, eyeLookDownLeft=0.7, cheekSquintRight=0.5)
-    for lids in rigged.mechanics.contacts.lids:
+    for lids in rigged.deformer.contacts.lids:
         moved = resolve_lids(lids, posed)
         assert blink < 1 or moved is not None
         moved = np.zeros((len(lids.vertices), 3)) if moved is None else moved
@@ -129,7 +130,7 @@ def test_lids_give_way_by_half_each(rigged: Rigged, blink: float, squint: float)
 
 def test_places_and_back(rigged: Rigged) -> None:
     lids = Lids.of(GENERIC, rigged.neutral, "left")
-    again = lids.at(lids.places(rigged.neutral))
+    again = lids.from_spherical(lids.spherical(rigged.neutral))
     np.testing.assert_allclose(again, rigged.neutral[lids.vertices], atol=1e-9)
 
 

@@ -25,7 +25,7 @@ def pressed(lips: Lips, vertices: np.ndarray) -> float:
 @pytest.mark.parametrize("name", MOUTH_UNITS)
 def test_no_unit_pushes_one_lip_into_the_other(rigged: Rigged, name: str) -> None:
     weights = {name: 1.0} | ({"jawOpen": 1.0} if name == "mouthClose" else {})
-    lips = rigged.mechanics.contacts.lips
+    lips = rigged.deformer.contacts.lips
     assert pressed(lips, rigged.posed(**weights)) < 0.5
     assert pressed(lips, rigged.living(**weights)) < 0.5
 
@@ -42,7 +42,7 @@ def test_no_unit_pushes_one_lip_into_the_other(rigged: Rigged, name: str) -> Non
 def test_in_mixtures_lips_do_not_pass_through_each_other(
     rigged: Rigged, weights: dict[str, float]
 ) -> None:
-    lips = rigged.mechanics.contacts.lips
+    lips = rigged.deformer.contacts.lips
     assert pressed(lips, rigged.living(**weights)) < 0.5
 
 
@@ -61,13 +61,13 @@ def test_an_open_jaw_with_closed_lips_is_closed(rigged: Rigged) -> None:
 
 
 def test_lips_without_contact_are_left_alone(rigged: Rigged) -> None:
-    lips = rigged.mechanics.contacts.lips
+    lips = rigged.deformer.contacts.lips
     assert resolve_lips(lips, rigged.neutral) is None
     assert resolve_lips(lips, rigged.posed(jawOpen=0.5)) is None
 
 
 def test_pushed_lips_part_and_the_rest_of_the_face_stays(rigged: Rigged) -> None:
-    lips = rigged.mechanics.contacts.lips
+    lips = rigged.deformer.contacts.lips
     pushed = rigged.neutral.copy()
     red = GENERIC.regions["lips"][lips.lower.vertices]
     pushed[lips.lower.vertices, 1] += 1.5 * red

@@ -91,7 +91,7 @@ def load_photo(path: str | Path, *, max_side: int = DEFAULT_MAX_SIDE) -> Photo:
         focal_per_px, focal_note = focal_prior_px(image)
         notes += focal_note
         small = _shrunk_rgb(image, max_side, notes)
-        # Asked for once the pixels are there: some decoders turn them, and say so only then.
+        # After the pixels are decoded: some decoders turn them and report it only then.
         turn = orientation(image)
         upright = _turned(small, turn)
         pixels = np.asarray(upright)

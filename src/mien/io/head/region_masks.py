@@ -9,12 +9,12 @@ import numpy as np
 from mien.arrays import Array, Float, UInt8
 from mien.io.files.image import encode_image, load_image
 from mien.mesh import Mesh
-from mien.rig.regions import MASKS
+from mien.rig.regions import MASK_NAMES
 from mien.texture.atlas import atlas_surface, fill_gutters
 from mien.texture.surface import interpolate_vertex_values
 
 FOLDER = "regions"
-MASK_FILES = frozenset(f"{FOLDER}/{name}.png" for name in MASKS)
+MASK_FILES = frozenset(f"{FOLDER}/{name}.png" for name in MASK_NAMES)
 """Within a head folder; meant to be painted."""
 _SIDE = 1024
 
@@ -41,7 +41,7 @@ def load_masks(folder: Path, mesh: Mesh) -> dict[str, Float[Array, " v"]]:
     Raises:
         FileFormatError: a file that is no picture.
     """
-    files = {name: folder / FOLDER / f"{name}.png" for name in MASKS}
+    files = {name: folder / FOLDER / f"{name}.png" for name in MASK_NAMES}
     return {
         name: _at_vertices(mesh, load_image(file)) for name, file in files.items() if file.exists()
     }

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from mien.animate.channels import MEMBERS, REGIONS, UNITS, split
+from mien.animate.channels import MEMBERS, REGION_NAMES, UNITS, split
 from mien.animate.timeline import Timeline, Tracks
 from mien.errors import FileFormatError, InputError
-from mien.reading.strict_json import unknown
+from mien.reading.strict_json import unknown_name
 
 
 def load_timeline(path: str | Path) -> Timeline:
@@ -43,7 +43,7 @@ def check_timeline(
     *,
     expressions: Collection[str],
     units: Collection[str],
-    regions: Collection[str] = REGIONS,
+    regions: Collection[str] = REGION_NAMES,
     path: str | Path = "timeline",
 ) -> None:
     """Refuse a timeline that moves what a head does not have.
@@ -63,10 +63,10 @@ def check_timeline(
         if group in MEMBERS:
             continue
         if group != UNITS and group not in regions:
-            raise FileFormatError(path, unknown("region", group, regions), place)
+            raise FileFormatError(path, unknown_name("region", group, regions), place)
         known, kind = (units, "unit") if group == UNITS else (expressions, "expression")
         if name not in known:
-            raise FileFormatError(path, unknown(kind, name, known), place)
+            raise FileFormatError(path, unknown_name(kind, name, known), place)
 
 
 def _load_table(path: str | Path) -> Timeline:

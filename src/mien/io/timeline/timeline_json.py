@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mien.animate.channels import ANGLES, GAZE, HEAD, MEMBERS, REGIONS, UNITS, split
+from mien.animate.channels import ANGLES, GAZE, HEAD, MEMBERS, REGION_NAMES, UNITS, split
 from mien.animate.curves import Curve
 from mien.animate.layers import GENERATORS, Generator
 from mien.animate.timeline import PIVOT_MM, Clip, Layer, Placement, Timeline, Tracks
@@ -119,7 +119,7 @@ def _numbers(value: object, place: str, count: int) -> list[float]:
 def _tracks(data: dict[str, Any], above: str) -> dict[str, Curve]:
     place = join(above, "tracks")
     tracks = {}
-    groups = (HEAD, GAZE, UNITS, *REGIONS)
+    groups = (HEAD, GAZE, UNITS, *REGION_NAMES)
     for group, members in as_object(data.get("tracks", {}), place, groups).items():
         inside = as_object(members, f"{place}.{group}", MEMBERS.get(group))
         for name, track in inside.items():

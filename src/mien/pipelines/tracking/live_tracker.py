@@ -17,8 +17,8 @@ from mien.animate.timeline import Moment
 from mien.arrays import Array, UInt8
 from mien.capture.video.live_source import LiveSource, PacedVideo
 from mien.head import Head
-from mien.pipelines.explained import units_of
 from mien.pipelines.tracking.streams import Stream, parse_stream
+from mien.rig.unit_decomposition import units_from_state
 from mien.track.state import Layout, Status, TrackedFrame
 
 _RECENT = 30  # frames over which the rate that is shown is counted
@@ -108,7 +108,7 @@ def run_live(
     """
     addresses = [parse_stream(text) for text in streams]
     with ExitStack() as stack:
-        opened = [Stream(address, partial(units_of, head)) for address in addresses]
+        opened = [Stream(address, partial(units_from_state, head)) for address in addresses]
         for stream in opened:
             stack.enter_context(closing(stream))
         live = stack.enter_context(closing(open_source(source)))

@@ -19,9 +19,9 @@ from mien.io.tracks.openface_csv import save_openface
 from mien.io.tracks.track_csv import check_track_place, save_track
 from mien.io.tracks.track_journal import journal_of
 from mien.io.tracks.track_json import sidecar_of
-from mien.pipelines.explained import units_of
 from mien.progress import Progress
 from mien.reading.names import portable_name
+from mien.rig.unit_decomposition import units_from_state
 from mien.track.state import Track
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class TrackFiles:
             what the user should know.
         """
         save_track(self.table, track)
-        explained = partial(units_of, head)
+        explained = partial(units_from_state, head)
         if self.openface:
             save_openface(self.openface, track, units_of=explained)
         if self.live_link and any(frame.state for frame in track.frames):

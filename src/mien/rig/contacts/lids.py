@@ -1,7 +1,7 @@
-"""Eyelids: they ride on the eyeballs, and upper and lower one meet without passing each other.
+"""Eyelids: contacts with the eyeball and of the upper with the lower lid.
 
-A lid's place is told on the unit sphere that the eyeball is an image of: longitude from the inner
-to the outer eye corner, latitude across, and the radius.
+Computed in spherical coordinates on the unit sphere that the eyeball is an affine image of:
+longitude from the inner to the outer eye corner, latitude across, and the radius.
 """
 
 from __future__ import annotations
@@ -14,27 +14,33 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, Int, frozen
 from mien.assets.generic import GenericHead
 from mien.rig.contacts.lid_contact import (
-    along_edge,
     edge_overlap,
-    move_apart,
-    off_lower,
-    places_of,
+    interpolate_along_edge,
+    radius_change,
+    resolve_lid_contact,
+    to_spherical,
 )
-from mien.rig.contacts.margins import behind, distances_from, fading, full_path, skin_edges
 from mien.rig.gaze import SIDES, Eyeball
+from mien.rig.skin_paths import (
+    behind_margin,
+    cosine_falloff,
+    geodesic_distances,
+    shortest_path,
+    skin_edges,
+)
 
 _CLEARANCE_MM = 0.4
-"""How far off the eyeball a lid stays that is further off at rest."""
+"""Least distance from the eyeball of a lid that is further off at rest."""
 _OVERLAP_MM = 0.35
-"""How far a closed upper lid reaches over the lower one's edge: no crack between two polygons."""
+"""How far a closed upper lid overlaps the lower one's edge, so that no crack shows."""
 _IN_FRONT_MM = 0.15
-"""How far its edge then lies before the lower one's."""
+"""How far its edge then lies in front of the lower one's."""
 _REACH_MM = 14.0
-"""How far over the closed lid a correction of its edge fades out."""
+"""Distance over the closed lid at which a correction of its edge has faded out."""
 _BALL_MM = 18.0
-"""Skin further off the eyeball has nothing to do with it."""
-_FIRM_MM = 0.5
-"""Lids that would overlap by this much more lie on each other."""
+"""Skin further off the eyeball is not part of the lids."""
+_FULL_CONTACT_MM = 0.5
+"""Excess overlap from which on the lids lie on each other."""
 _STEPS = (0.25, 0.5, 0.75, 1.0)
 
 
@@ -48,10 +54,10 @@ class Lids:
         upper: how many vertices the upper and the lower edge have, from the inner to the outer
             corner, both of which are in both.
         lower: as `upper`.
-        share: (L,) how far a correction of the nearer edge goes along.
-        on_upper: (L,) whether that is the upper one.
-        least: (L,) radius below which a vertex is in the eyeball; its own at rest if that is less;
-            0 on the back of the lids, which may be.
+        falloff: (L,) weight of a correction of the nearer edge.
+        on_upper: (L,) whether the nearer edge is the upper one.
+        min_radius: (L,) a smaller radius is in the eyeball; the radius at rest if that is
+            less; 0 on the back of the lids, which is not tested.
         axes: (3, 3) rows: towards the middle of the lids, towards the outer corner, upwards.
     """
 
@@ -59,9 +65,9 @@ class Lids:
     vertices: Int[Array, " l"]
     upper: int
     lower: int
-    share: Float[Array, " l"]
+    falloff: Float[Array, " l"]
     on_upper: Bool[Array, " l"]
-    least: Float[Array, " l"]
+    min_radius: Float[Array, " l"]
     axes: Float[Array, "3 3"]
 
     @staticmethod
@@ -71,31 +77,31 @@ class Lids:
         blink = generic.unit_offsets[generic.unit_names.index(f"eyeBlink{side.capitalize()}")]
         edges = skin_edges(generic, generic.mesh.vertices)
         upper, lower = (
-            full_path(edges, generic.polylines[f"{side}_{which}_eyelid"])
+            shortest_path(edges, generic.polylines[f"{side}_{which}_eyelid"])
             for which in ("upper", "lower")
         )
         closed = skin_edges(generic, generic.mesh.vertices + blink)
-        distance, nearest = distances_from(closed, np.concatenate([upper, lower[1:-1]]))
+        distance, nearest = geodesic_distances(closed, np.concatenate([upper, lower[1:-1]]))
         around = np.flatnonzero(distance < 2 * _REACH_MM)
         off = np.linalg.norm(eyeball.on_sphere(vertices[around]), axis=1) - 1
         around = around[(off < _BALL_MM / eyeball.radius) & (off > -0.5)]
         inner = np.setdiff1d(around, np.concatenate([upper, lower]))
         chosen = np.concatenate([upper, lower, inner])
-        share = fading(distance[chosen], _REACH_MM)
+        falloff = cosine_falloff(distance[chosen], _REACH_MM)
         on_upper = np.isin(nearest[chosen], upper)
         axes = _axes(eyeball.on_sphere(vertices[upper[[0, -1]]]))
         radius = np.linalg.norm(eyeball.on_sphere(vertices[chosen]), axis=1)
-        least = np.minimum(radius, 1 + _CLEARANCE_MM / eyeball.radius)
-        back = behind(edges, np.concatenate([upper, lower]), generic.vertex_of("nose_tip"))
-        least[np.isin(chosen, back)] = 0.0
+        min_radius = np.minimum(radius, 1 + _CLEARANCE_MM / eyeball.radius)
+        back = behind_margin(edges, np.concatenate([upper, lower]), generic.vertex_of("nose_tip"))
+        min_radius[np.isin(chosen, back)] = 0.0
         return Lids(
             eyeball=eyeball,
             vertices=frozen(chosen),
             upper=len(upper),
             lower=len(lower),
-            share=frozen(share),
+            falloff=frozen(falloff),
             on_upper=frozen(on_upper),
-            least=frozen(least),
+            min_radius=frozen(min_radius),
             axes=axes,
         )
 
@@ -109,13 +115,13 @@ class Lids:
         """The inverse of to_sphere."""
         return frozen(self.axes @ self.eyeball.shape.T)
 
-    def places(self, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
-        """(L, 3) longitude and latitude, radians, and radius of the lids on the unit sphere."""
-        return places_of((vertices[self.vertices] - self.eyeball.centre) @ self.to_sphere)
+    def spherical(self, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
+        """(L, 3) longitude and latitude, radians, and radius of the lids."""
+        return to_spherical((vertices[self.vertices] - self.eyeball.centre) @ self.to_sphere)
 
-    def at(self, places: Float[Array, "l 3"]) -> Float[Array, "l 3"]:
-        """(L, 3) mm: the inverse of places."""
-        longitude, latitude, radius = places.T
+    def from_spherical(self, coordinates: Float[Array, "l 3"]) -> Float[Array, "l 3"]:
+        """(L, 3) mm: the inverse of spherical."""
+        longitude, latitude, radius = coordinates.T
         points = np.column_stack(
             [
                 np.cos(latitude) * np.cos(longitude),
@@ -125,31 +131,31 @@ class Lids:
         )
         return (radius[:, None] * points) @ self.from_sphere + self.eyeball.centre
 
-    def overlap(self, places: Float[Array, "l 3"]) -> Float[Array, " u"]:
+    def overlap(self, coordinates: Float[Array, "l 3"]) -> Float[Array, " u"]:
         """(U,) radians by which the upper edge's vertices lie below the lower edge."""
-        return edge_overlap(*self.edges(places))
+        return edge_overlap(*self.edges(coordinates))
 
-    def edges(self, places: Float[Array, "l 3"]) -> tuple[Array, Array]:
-        """The upper and the lower edge's places, from the inner to the outer corner."""
-        return places[: self.upper], places[self.upper : self.upper + self.lower]
+    def edges(self, coordinates: Float[Array, "l 3"]) -> tuple[Array, Array]:
+        """The upper and the lower edge's coordinates, from the inner to the outer corner."""
+        return coordinates[: self.upper], coordinates[self.upper : self.upper + self.lower]
 
     @cached_property
     def full_overlap(self) -> Float[Array, " u"]:
-        """(U,) radians: that of closed lids; none at the corners, where both are one."""
+        """(U,) radians: overlap of closed lids; 0 at the corners, which both share."""
         shape = np.sin(np.linspace(0, np.pi, self.upper)) ** 0.5
         return frozen(_OVERLAP_MM / self.eyeball.radius * shape)
 
     @cached_property
     def in_front(self) -> Float[Array, " u"]:
-        """(U,) by how much more radius closed upper lids lie before the lower ones."""
+        """(U,) difference of radius by which closed upper lids lie in front of the lower ones."""
         return frozen(self.full_overlap * (_IN_FRONT_MM / _OVERLAP_MM))
 
     def spread(
-        self, places: Float[Array, "l 3"], corrections: Float[Array, " u"]
+        self, coordinates: Float[Array, "l 3"], corrections: Float[Array, " u"]
     ) -> Float[Array, " l"]:
-        """(L,) what corrections along the upper edge are elsewhere on both lids."""
-        along: Array = along_edge(places[:, 0], self.upper, corrections)
-        return along * self.share
+        """(L,) corrections along the upper edge, extended over both lids."""
+        along: Array = interpolate_along_edge(coordinates[:, 0], self.upper, corrections)
+        return along * self.falloff
 
 
 def close_lids(
@@ -158,6 +164,7 @@ def close_lids(
     """The units with lids that close at eyeBlink 1 and never enter the eyeball.
 
     Args:
+        generic: its topology and unit names.
         vertices: (V, 3) mm, the neutral face.
         units: (52, V, 3) mm, as transferred.
     """
@@ -171,29 +178,29 @@ def close_lids(
                 offsets[lids.vertices] += _closing(lids, vertices + offsets)
             for weight in _STEPS:
                 posed = vertices + weight * offsets
-                places = lids.places(posed)
-                if (places[:, 2] < lids.least).any():
-                    offsets[lids.vertices] += _lift(lids, places) / weight
+                coordinates = lids.spherical(posed)
+                if (coordinates[:, 2] < lids.min_radius).any():
+                    offsets[lids.vertices] += _lift(lids, coordinates) / weight
     return result
 
 
 def _closing(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"]:
-    """(L, 3) mm that lays the upper edge along the lower one, just over and before it."""
-    before = lids.places(vertices)
-    places = before.copy()
-    places[:, 2] = np.maximum(places[:, 2], lids.least)
-    down = lids.overlap(places) - lids.full_overlap
-    places[:, 1] += lids.spread(places, down) * lids.on_upper
-    off = off_lower(*lids.edges(places), lids.in_front)
-    places[:, 2] += lids.spread(places, off) * lids.on_upper
-    return lids.at(places) - lids.at(before)
+    """(L, 3) mm that moves the upper edge onto the lower one, just over and in front of it."""
+    before = lids.spherical(vertices)
+    coordinates = before.copy()
+    coordinates[:, 2] = np.maximum(coordinates[:, 2], lids.min_radius)
+    down = lids.overlap(coordinates) - lids.full_overlap
+    coordinates[:, 1] += lids.spread(coordinates, down) * lids.on_upper
+    off = radius_change(*lids.edges(coordinates), lids.in_front)
+    coordinates[:, 2] += lids.spread(coordinates, off) * lids.on_upper
+    return lids.from_spherical(coordinates) - lids.from_spherical(before)
 
 
-def _lift(lids: Lids, places: Float[Array, "l 3"]) -> Float[Array, "l 3"]:
+def _lift(lids: Lids, coordinates: Float[Array, "l 3"]) -> Float[Array, "l 3"]:
     """(L, 3) mm out of the eyeball."""
-    lifted = places.copy()
-    lifted[:, 2] = np.maximum(places[:, 2], lids.least)
-    return lids.at(lifted) - lids.at(places)
+    lifted = coordinates.copy()
+    lifted[:, 2] = np.maximum(coordinates[:, 2], lids.min_radius)
+    return lids.from_spherical(lifted) - lids.from_spherical(coordinates)
 
 
 def _axes(corners: Float[Array, "2 3"]) -> Float[Array, "3 3"]:
@@ -209,21 +216,21 @@ def _axes(corners: Float[Array, "2 3"]) -> Float[Array, "3 3"]:
 def resolve_lids(lids: Lids, vertices: Float[Array, "v 3"]) -> Float[Array, "l 3"] | None:
     """(L, 3) mm that takes the lids out of each other and out of the eyeball; None: no contact.
 
-    The eyeball may have been carried elsewhere; it is taken to be where its vertices are.
+    The position of the eyeball is taken from its vertices.
     """
     ball = vertices[lids.eyeball.vertices]
     points = (vertices[lids.vertices] - ball.sum(axis=0) / len(ball)) @ lids.to_sphere
     moves = np.zeros_like(points)
-    touching = move_apart(
+    touching = resolve_lid_contact(
         points,
         lids.upper,
         lids.lower,
-        lids.share,
+        lids.falloff,
         lids.on_upper,
-        lids.least,
+        lids.min_radius,
         lids.full_overlap,
         lids.in_front,
-        lids.eyeball.radius / _FIRM_MM,
+        lids.eyeball.radius / _FULL_CONTACT_MM,
         moves,
     )
     return moves @ lids.from_sphere if touching else None

@@ -18,7 +18,11 @@ from mien.capture.faces.detector import (
 from mien.capture.faces.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace
 from mien.errors import EstimationError
 from mien.head import Head
-from mien.reconstruction.expression.gaze import MOST_RAD, direction_to_iris, yaw_pitch_of
+from mien.reconstruction.expression.gaze import (
+    MAX_GAZE_RAD,
+    direction_to_iris,
+    yaw_pitch_from_directions,
+)
 from mien.rig.followers import part_vertices
 from mien.rig.gaze import SIDES
 from mien.rig.rig import Rig
@@ -212,7 +216,7 @@ class _GazeEstimator:
         self._centres = np.array([head.mesh.vertices[ball].mean(axis=0) for ball in balls])
         forward = positions[_IRISES] - self._centres
         self._radii = np.linalg.norm(forward, axis=1)
-        self._forward = yaw_pitch_of(forward / self._radii[:, None])
+        self._forward = yaw_pitch_from_directions(forward / self._radii[:, None])
         self._lids = positions[_LIDS]
         masks = np.stack([rig.mask(region) for region in layout.regions])
         self._region_weights = np.stack([masks[:, ball[0]] for ball in balls])
@@ -232,9 +236,9 @@ class _GazeEstimator:
             ]
         )
         by_expressions = np.einsum("er,rk,ekc->ec", self._region_weights, weights, self._expressed)
-        angles = yaw_pitch_of(directions) - self._forward - by_expressions
+        angles = yaw_pitch_from_directions(directions) - self._forward - by_expressions
         gaze: Array = self._eye_weights(camera, points) @ angles
-        return np.clip(gaze, -MOST_RAD, MOST_RAD)
+        return np.clip(gaze, -MAX_GAZE_RAD, MAX_GAZE_RAD)
 
     def _eye_weights(self, camera: Camera, points: Float[Array, "478 2"]) -> Float[Array, " 2"]:
         """(2,) weights of the eyes' directions, at most 1 in total; 0 of a nearly closed eye."""

@@ -7,9 +7,9 @@ import pytest
 
 from mien.assets.generic import load_generic_head
 from mien.errors import InputError
-from mien.rig.contacts.contacts import Contacts, Mechanics
+from mien.rig.deformer import Contacts, FaceDeformer
 from mien.rig.followers import Followers, part_vertices
-from mien.rig.gaze import LOOK_UNITS
+from mien.rig.gaze import EYE_LOOK_UNITS
 
 if TYPE_CHECKING:
     from conftest import Rigged
@@ -18,15 +18,15 @@ GENERIC = load_generic_head()
 
 
 def test_without_contact_the_very_same_array_comes_back(rigged: Rigged) -> None:
-    contacts = rigged.mechanics.contacts
+    contacts = rigged.deformer.contacts
     for posed in (rigged.neutral, rigged.posed(jawOpen=0.4), rigged.posed(browInnerUp=1.0)):
-        assert contacts.resolved(posed) is posed
+        assert contacts.resolve(posed) is posed
 
 
 def test_the_input_is_not_written_to(rigged: Rigged) -> None:
     posed = rigged.posed(eyeBlinkLeft=1.0, eyeLookDownLeft=1.0)
     kept = posed.copy()
-    resolved = rigged.mechanics.contacts.resolved(posed)
+    resolved = rigged.deformer.contacts.resolve(posed)
     np.testing.assert_array_equal(posed, kept)
     assert np.abs(resolved - posed).max() > 0.5
 
@@ -42,14 +42,14 @@ def test_a_mouth_closes_only_as_far_as_the_jaw_is_open(rigged: Rigged) -> None:
 
 
 def test_what_is_taken_over_is_said() -> None:
-    assert set(Mechanics.taken_over) == {*LOOK_UNITS, "mouthClose"}
-    assert set(Mechanics.taken_over) <= set(GENERIC.unit_names)
+    assert set(FaceDeformer.nonlinear_units) == {*EYE_LOOK_UNITS, "mouthClose"}
+    assert set(FaceDeformer.nonlinear_units) <= set(GENERIC.unit_names)
 
 
 def test_lashes_go_with_the_lid(rigged: Rigged) -> None:
     posed = rigged.posed(eyeBlinkLeft=1.0, eyeLookDownLeft=1.0)
-    moved = rigged.mechanics.contacts.resolved(posed) - posed
-    followers = rigged.mechanics.contacts.followers
+    moved = rigged.deformer.contacts.resolve(posed) - posed
+    followers = rigged.deformer.contacts.followers
     lashes = np.isin(followers.vertices, part_vertices(GENERIC, "lashes"))
     skin = moved[followers.carriers[lashes]]
     assert np.abs(moved[followers.vertices[lashes]]).max() > 0.5
@@ -58,7 +58,7 @@ def test_lashes_go_with_the_lid(rigged: Rigged) -> None:
 
 
 def test_followers_that_nothing_carries_are_left_out(rigged: Rigged) -> None:
-    contacts = rigged.mechanics.contacts
+    contacts = rigged.deformer.contacts
     touching = [*contacts.lids, contacts.lips.upper, contacts.lips.lower]
     moves = np.zeros_like(rigged.neutral)
     moves[np.concatenate([item.vertices for item in touching])] = [1.0, 2.0, 3.0]
@@ -74,4 +74,4 @@ def test_bad_vertices_are_refused() -> None:
     with pytest.raises(InputError, match=r"vertices: expected shape"):
         Contacts.of(GENERIC, np.zeros((3, 3)))
     with pytest.raises(InputError, match=r"units: expected shape"):
-        Mechanics.of(GENERIC, GENERIC.mesh.vertices, np.zeros((3, 3, 3)))
+        FaceDeformer.of(GENERIC, GENERIC.mesh.vertices, np.zeros((3, 3, 3)))

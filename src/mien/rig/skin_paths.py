@@ -1,4 +1,4 @@
-"""The edges of lids and lips as unbroken paths of mesh edges, and distances from them."""
+"""Paths and geodesic distances over the edges of the skin mesh."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def skin_edges(generic: GenericHead, vertices: Float[Array, "v 3"]) -> csr_matri
     return coo_matrix((np.concatenate([length, length]), place), (len(vertices),) * 2).tocsr()
 
 
-def full_path(edges: csr_matrix, corners: Sequence[int]) -> Int[Array, " n"]:
-    """All vertices along the shortest way over the mesh through these corners, in their order."""
+def shortest_path(edges: csr_matrix, corners: Sequence[int]) -> Int[Array, " n"]:
+    """All vertices along the shortest path over the mesh through these corners, in order."""
     from scipy.sparse.csgraph import dijkstra
 
     path = [corners[0]]
@@ -35,24 +35,24 @@ def full_path(edges: csr_matrix, corners: Sequence[int]) -> Int[Array, " n"]:
     return np.array(path)
 
 
-def distances_from(
+def geodesic_distances(
     edges: csr_matrix, sources: Int[Array, " n"]
 ) -> tuple[Float[Array, " v"], Int[Array, " v"]]:
-    """(V,) way over the mesh to the nearest source, mm, infinite where there is none; (V,) it."""
+    """(V,) mm along edges to the nearest source, infinite where there is none; (V,) that source."""
     from scipy.sparse.csgraph import dijkstra
 
     distance, _, nearest = dijkstra(edges, indices=sources, min_only=True, return_predecessors=True)
     return distance, nearest
 
 
-def fading(distance: Float[Array, " n"], reach: float) -> Float[Array, " n"]:
-    """1 at distance 0, 0 from `reach` on, with no kink at either end."""
+def cosine_falloff(distance: Float[Array, " n"], reach: float) -> Float[Array, " n"]:
+    """1 at distance 0, 0 from `reach` on, by half a period of the cosine."""
     share = np.clip(distance / reach, 0.0, 1.0)
     return 0.5 + 0.5 * np.cos(np.pi * share)
 
 
-def behind(edges: csr_matrix, margin: Int[Array, " n"], front: int) -> Int[Array, " v"]:
-    """Vertices that one cannot reach from the one in front without crossing the closed margin."""
+def behind_margin(edges: csr_matrix, margin: Int[Array, " n"], front: int) -> Int[Array, " v"]:
+    """Vertices that a closed margin separates from the one in front."""
     from scipy.sparse.csgraph import connected_components
 
     kept = np.setdiff1d(np.arange(edges.shape[0]), margin)

@@ -1,4 +1,4 @@
-"""Faces after their units have been added up: eyes that turn, lids and lips that touch."""
+"""A face deformed by its units, with rotating eyes and contacts of lids and lips."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from mien.arrays import Array, Float, check_array, frozen
 from mien.assets.generic import GenericHead
 from mien.rig.contacts.lids import Lids, close_lids, resolve_lids
-from mien.rig.contacts.lips import Lips, part_lips, resolve_lips
+from mien.rig.contacts.lips import Lips, resolve_lips, separate_lips
 from mien.rig.followers import Followers
-from mien.rig.gaze import LOOK_UNITS, SIDES, Look, turn_eyeballs
+from mien.rig.gaze import EYE_LOOK_UNITS, SIDES, GazeModel, turn_eyeballs
 from mien.rig.sparse_offsets import SparseOffsets
 from mien.rig.unit_transfer import transfer_units
 
@@ -21,12 +21,12 @@ _AHEAD = frozen(np.zeros(2))
 
 @dataclass(frozen=True)
 class Contacts:
-    """What must not pass through what on one head: lids and eyeballs, lid and lid, lip and lip.
+    """Contacts of one head: lids with eyeballs, lid with lid, lip with lip.
 
     Attributes:
         lids: of the left and the right eye.
         lips: upper and lower.
-        followers: of lashes and hair what goes with the lids and the lips.
+        followers: the lashes and hair that follow the lids and the lips.
     """
 
     lids: tuple[Lids, Lids]
@@ -42,13 +42,13 @@ class Contacts:
         touching = [item.vertices for item in (left, right, lips.upper, lips.lower)]
         return Contacts((left, right), lips, followers.of_skin(np.concatenate(touching)))
 
-    def resolved(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
+    def resolve(self, vertices: Float[Array, "v 3"]) -> Float[Array, "v 3"]:
         """(V, 3) mm with every contact resolved; the same array where there is none."""
-        parted = resolve_lips(self.lips, vertices)
+        lips = resolve_lips(self.lips, vertices)
         lifted = [(lids, resolve_lids(lids, vertices)) for lids in self.lids]
-        if parted is None and all(moved is None for _, moved in lifted):
+        if lips is None and all(moved is None for _, moved in lifted):
             return vertices
-        moves = np.zeros_like(vertices) if parted is None else parted
+        moves = np.zeros_like(vertices) if lips is None else lips
         for lids, moved in lifted:
             if moved is not None:
                 moves[lids.vertices] += moved
@@ -58,31 +58,30 @@ class Contacts:
 
 
 @dataclass(frozen=True)
-class Mechanics:
-    """How units, gaze and contacts move one head.
+class FaceDeformer:
+    """Deforms one head by units, gaze and contacts.
 
     Attributes:
-        look: how the eyes turn.
-        contacts: what must not pass through what.
-        offsets: of the units; the eyeLook units' leave the eyeballs to be turned.
-        jaw: which units jawOpen and mouthClose are.
-        close: which units jawOpen and mouthClose are.
+        gaze_model: rotates the eyes.
+        contacts: of lids and lips.
+        offsets: of the units; those of the eyeLook units leave out the eyeballs.
+        jaw: index of jawOpen.
+        close: index of mouthClose.
     """
 
-    look: Look
+    gaze_model: GazeModel
     contacts: Contacts
     offsets: SparseOffsets
     jaw: int
     close: int
 
-    taken_over: ClassVar[tuple[str, ...]] = (*LOOK_UNITS, "mouthClose")
-    """Units that do something else than add their offsets: eyeballs turn, and a mouth can be
-    closed only as far as the jaw is open."""
+    nonlinear_units: ClassVar[tuple[str, ...]] = (*EYE_LOOK_UNITS, "mouthClose")
+    """Units whose effect is not linear: eyeballs rotate, and mouthClose is limited by jawOpen."""
 
     @staticmethod
     def of(
         generic: GenericHead, vertices: Float[Array, "v 3"], units: Float[Array, "52 v 3"]
-    ) -> Mechanics:
+    ) -> FaceDeformer:
         """For a head with these neutral vertices and unit offsets, mm.
 
         Raises:
@@ -90,12 +89,12 @@ class Mechanics:
         """
         units = check_array("units", units, generic.unit_offsets.shape)
         vertices = check_array("vertices", vertices, generic.mesh.vertices.shape)
-        look = Look.of(generic, vertices)
-        offsets = SparseOffsets.of(look.without_eyeballs(units))
+        gaze_model = GazeModel.of(generic, vertices)
+        offsets = SparseOffsets.of(gaze_model.without_eyeballs(units))
         jaw, close = (generic.unit_names.index(name) for name in ("jawOpen", "mouthClose"))
-        return Mechanics(look, Contacts.of(generic, vertices), offsets, jaw, close)
+        return FaceDeformer(gaze_model, Contacts.of(generic, vertices), offsets, jaw, close)
 
-    def applied(
+    def deform(
         self,
         vertices: Float[Array, "v 3"],
         units: Float[Array, " u"],
@@ -103,29 +102,30 @@ class Mechanics:
         *,
         contacts: bool = True,
     ) -> Float[Array, "v 3"]:
-        """(V, 3) mm: the face as its units move it, as it looks and touches.
+        """(V, 3) mm: the face with units, gaze and contacts applied.
 
         Args:
             vertices: (V, 3) mm, the neutral or any mixed face.
             units: weights.
-            gaze: yaw and pitch, radians; in addition to what the units say; the lids go along.
-            contacts: off where lids and lips may pass through each other.
+            gaze: yaw and pitch, radians, added to that of the units; the lids follow.
+            contacts: whether to resolve contacts of lids and lips.
         """
-        weights, angles = self.look.motion(units, gaze)
+        weights, angles = self.gaze_model.motion(units, gaze)
         weights[self.close] -= max(units[self.close] - max(units[self.jaw], 0.0), 0.0)
         moved = vertices.copy()
         self.offsets.add(weights, moved)
-        self.look.turn(moved, angles)
-        return self.contacts.resolved(moved) if contacts else moved
+        self.gaze_model.turn(moved, angles)
+        return self.contacts.resolve(moved) if contacts else moved
 
 
 def fit_units(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[Array, "52 v 3"]:
     """(52, V, 3) float32 mm: the face units of the person with these neutral vertices.
 
-    Transferred from the generic head; eyeballs that turn about their centres, lids that close and
-    lips that meet at weight 1.
+    Transferred from the generic head, then corrected: eyeballs rotate about their centres, lids
+    close and lips meet at weight 1.
 
     Args:
+        generic: the head whose units are transferred.
         vertices: (V, 3) mm, head space, the generic topology.
 
     Raises:
@@ -133,5 +133,5 @@ def fit_units(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[Arra
     """
     units = transfer_units(generic, vertices)
     units = close_lids(generic, vertices, turn_eyeballs(generic, vertices, units))
-    units = part_lips(generic, vertices, units)
+    units = separate_lips(generic, vertices, units)
     return units.astype(np.float32)

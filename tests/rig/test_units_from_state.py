@@ -5,9 +5,9 @@ import pytest
 
 from mien.assets.generic import load_generic_head
 from mien.head import Expression, Head
-from mien.pipelines.explained import region_of, units_of
-from mien.rig.regions import AROUND
+from mien.rig.regions import ENCLOSING_REGIONS
 from mien.rig.state import FaceState
+from mien.rig.unit_decomposition import unit_region, units_from_state
 
 GENERIC = load_generic_head()
 VERTICES = GENERIC.mesh.vertices
@@ -46,29 +46,29 @@ def head() -> Head:
     ],
 )
 def test_regions_of_units(unit: str, region: str) -> None:
-    assert region_of(unit) == region
+    assert unit_region(unit) == region
 
 
 def test_every_unit_has_a_region() -> None:
-    assert {region_of(unit) for unit in GENERIC.unit_names} <= set(AROUND)
+    assert {unit_region(unit) for unit in GENERIC.unit_names} <= set(ENCLOSING_REGIONS)
 
 
 def test_units_stay_themselves(head: Head) -> None:
-    assert units_of(head, FaceState(units={"jawOpen": 0.3})) == {"jawOpen": 0.3}
+    assert units_from_state(head, FaceState(units={"jawOpen": 0.3})) == {"jawOpen": 0.3}
 
 
 def test_an_expression_is_its_units(head: Head) -> None:
-    assert units_of(head, FaceState({"face": {"joy": 1.0}})) == JOY
+    assert units_from_state(head, FaceState({"face": {"joy": 1.0}})) == JOY
 
 
 def test_a_mixture_adds_up(head: Head) -> None:
     state = FaceState({"face": {"joy": 0.5, "awe": 0.5, "neutral": 0.0}}, {"jawOpen": 0.125})
     expected = {name: 0.5 * weight for name, weight in JOY.items()}
     expected |= {"jawOpen": 0.375, "browInnerUp": 0.5}
-    assert units_of(head, state) == expected
+    assert units_from_state(head, state) == expected
 
 
 def test_a_regions_weights_hold_instead_of_the_faces(head: Head) -> None:
     state = FaceState({"face": {"joy": 1.0}, "mouth": {"awe": 1.0}, "left_mouth": {"joy": 0.5}})
     expected = {"mouthSmileLeft": 0.4, "eyeSquintLeft": 0.4, "noseSneerLeft": 0.2, "jawOpen": 0.5}
-    assert units_of(head, state) == expected
+    assert units_from_state(head, state) == expected
