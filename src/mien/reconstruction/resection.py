@@ -12,11 +12,11 @@ from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.reconstruction.features import Features
 
-LEAST_FEATURES = 4
+MIN_FEATURES = 4
 """With fewer, several cameras would do."""
 
 
-def place_cameras(
+def resect_cameras(
     views: Sequence[CapturedView],
     features: Features,
     focal_px: Float[Array, " k"],
@@ -36,7 +36,7 @@ def place_cameras(
     return tuple(
         _place(view, places[seen], image[seen], focal)
         for view, seen, image, focal in zip(
-            views, features.seen, features.image_points, focal_px.tolist(), strict=True
+            views, features.observed, features.image_points, focal_px.tolist(), strict=True
         )
     )
 
@@ -46,7 +46,7 @@ def _place(
 ) -> Camera:
     import cv2
 
-    if len(places) < LEAST_FEATURES:
+    if len(places) < MIN_FEATURES:
         raise EstimationError(f"{view.photo.name}: {len(places)} points are too few for a camera")
     width, height = view.photo.size
     centred = image - [width / 2, height / 2]

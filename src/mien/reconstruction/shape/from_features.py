@@ -15,7 +15,7 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.reconstruction.features import Features
 from mien.reconstruction.shape.deformation import deform_head
-from mien.reconstruction.triangulation import intersect_rays
+from mien.reconstruction.triangulation import triangulate
 
 IDENTITY_SIGMA_MM = 3.0
 """How far a feature lies off the identity basis, its meaning on another face included."""
@@ -43,7 +43,7 @@ def shape_from_features(
     Source:
         [Pighin 2002] sec. 5.1.3, repeated; the identity basis beneath is ours.
     """
-    twice = features.seen.sum(axis=0) > 1
+    twice = features.observed.sum(axis=0) > 1
     deviation = features.sigma_mm.min(axis=0)
     coefficients = estimate_identity(features, points, generic)
     vertices = generic.mesh.vertices + generic.identity.offsets(coefficients)
@@ -57,7 +57,7 @@ def shape_from_features(
     deviation = np.where(twice, deviation, np.maximum(deviation, SEEN_ONCE_SIGMA_MM))
     for _ in range(rounds):
         places = features.on(vertices)
-        on_rays = intersect_rays(cameras, features.image_points, current=places).points
+        on_rays = triangulate(cameras, features.image_points, current=places).points
         goals = np.where(twice[:, None], points, on_rays)
         vertices = deform_head(
             vertices, places, goals, generic, deviation_mm=deviation, kernel=kernel

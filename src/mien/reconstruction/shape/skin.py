@@ -24,7 +24,7 @@ HELD_SD_MM = 0.3
 _ROUNDS = 3
 
 
-def move_skin(
+def deform_skin(
     vertices: Float[Array, "v 3"],
     observations: SurfaceObservations,
     cameras: Sequence[Camera],

@@ -18,7 +18,11 @@ from mien.capture.faces.detector import (
 from mien.capture.faces.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace
 from mien.errors import EstimationError
 from mien.head import Head
-from mien.reconstruction.expression.gaze import MOST_RAD, direction_to_iris, yaw_pitch_of
+from mien.reconstruction.expression.gaze import (
+    MAX_GAZE_RAD,
+    direction_to_iris,
+    yaw_pitch_from_directions,
+)
 from mien.rig.followers import part_vertices
 from mien.rig.gaze import SIDES
 from mien.rig.rig import Rig
@@ -179,7 +183,7 @@ class _Eyes:
         self._centres = np.array([head.mesh.vertices[ball].mean(axis=0) for ball in balls])
         ahead = places[_IRISES] - self._centres
         self._radii = np.linalg.norm(ahead, axis=1)
-        self._ahead = yaw_pitch_of(ahead / self._radii[:, None])
+        self._ahead = yaw_pitch_from_directions(ahead / self._radii[:, None])
         self._lids = places[_LIDS]
         masks = np.stack([rig.mask(region) for region in layout.regions])
         self._obeys = np.stack([masks[:, ball[0]] for ball in balls])
@@ -199,9 +203,9 @@ class _Eyes:
             ]
         )
         own = np.einsum("er,rk,ekc->ec", self._obeys, weights, self._expressed)
-        angles = yaw_pitch_of(directions) - self._ahead - own
+        angles = yaw_pitch_from_directions(directions) - self._ahead - own
         gaze: Array = self._openness(camera, points) @ angles
-        return np.clip(gaze, -MOST_RAD, MOST_RAD)
+        return np.clip(gaze, -MAX_GAZE_RAD, MAX_GAZE_RAD)
 
     def _openness(self, camera: Camera, points: Float[Array, "478 2"]) -> Float[Array, " 2"]:
         """(2,) what either eye says, together at most 1: nothing once it is nearly shut."""
