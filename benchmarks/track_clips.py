@@ -25,7 +25,7 @@ from mien.head import Head
 from mien.io.head.head_folder import load_head
 from mien.render.picture import HeadRenderer
 from mien.report.track.comparison import draw_tracked, face_psnr
-from mien.report.track.series import series_of
+from mien.track.series import series_of
 from mien.track.smoothing import smooth
 from mien.track.state import Track
 

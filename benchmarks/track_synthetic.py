@@ -32,8 +32,8 @@ from mien.capture.faces.detector import LandmarkDetector
 from mien.head import Head
 from mien.io.head.head_folder import load_head
 from mien.report.track.plots import write_track_plots
-from mien.report.track.series import rotation_errors, series_of, translation_errors, truth_for
 from mien.rig.rig import Rig
+from mien.track.series import rotation_errors, series_of, translation_errors, truth_for
 
 HEADER = (
     "",

@@ -10,7 +10,7 @@ from PIL import Image
 from mien.arrays import Array
 from mien.report.track.charts import Plot, Row, plots_of
 from mien.report.track.figures import limits_of, save_figure, stretches
-from mien.report.track.series import series_of
+from mien.track.series import series_of
 from mien.track.state import Layout, Track
 from tracks import random_state, random_track, track_of
 

@@ -11,7 +11,7 @@ from filmed import written
 from mien.errors import InputError
 from mien.report.track.charts import plots_of
 from mien.report.track.plots import accuracy, check_plots_place, summary, write_track_plots
-from mien.report.track.series import series_of, truth_for
+from mien.track.series import series_of, truth_for
 from mien.track.state import Layout, Track
 from posable import head
 from tracks import random_state, random_track, track_of

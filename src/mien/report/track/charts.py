@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mien.arrays import Array, Float
-from mien.report.track.series import (
+from mien.track.series import (
     Series,
     quaternions,
     rotation_errors,

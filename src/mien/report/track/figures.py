@@ -12,7 +12,7 @@ import numpy as np
 from mien.arrays import Array, Bool
 from mien.io.files.atomic import atomic_file
 from mien.report.track.charts import Plot, Row
-from mien.report.track.series import Series
+from mien.track.series import Series
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -18,14 +18,14 @@ from mien.render.picture import HeadRenderer
 from mien.report.track.charts import Plot, plots_of
 from mien.report.track.figures import save_figure
 from mien.report.track.overlay import decoded
-from mien.report.track.series import (
+from mien.report.track.sheet import contact_sheet, evenly_chosen
+from mien.track.series import (
     Series,
     rotation_errors,
     series_of,
     translation_errors,
     truth_for,
 )
-from mien.report.track.sheet import contact_sheet, evenly_chosen
 from mien.track.state import Track
 
 PAGE, SHEET = "index.html", "sheet.jpg"
