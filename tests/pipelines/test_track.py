@@ -202,7 +202,7 @@ def test_stopped_while_it_drew(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("mien.report.track.overlay.write_overlay", stop)
+        patch.setattr("mien.report.track.overlay.save_overlay", stop)
         with pytest.raises(KeyboardInterrupt):
             track_video(clip, head(), files)
     tracked = track_video(clip, head(), files, resume=True)
