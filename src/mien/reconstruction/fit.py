@@ -48,6 +48,9 @@ def fit_views(
     """Cameras and shape of one expression.
 
     Args:
+        views: photos of the expression.
+        generic: the generic head.
+        options: how it is fitted.
         progress: told the steps of the registration done and their total.
 
     Raises:

@@ -25,6 +25,7 @@ def resect_cameras(
     """Where each photo was taken from, by where it shows the features of a head.
 
     Args:
+        views: K photos.
         features: of the same K photos.
         focal_px: (K,).
         vertices: (V, 3) mm.

@@ -272,7 +272,9 @@ class BundleProblem:
     def camera_equations(
         self, state: BundleState, at: Reprojection, left: Float[Array, "m 2 7"]
     ) -> tuple[Float[Array, "d d"], Float[Array, "n d 3"], Float[Array, " d"]]:
-        """sum z'w (a y + b x) + S y = -sum z'wr - S s, with prior precision S and deviation s.
+        """The camera equations.
+
+        sum z'w (a y + b x) + S y = -sum z'wr - S s, with prior precision S and deviation s.
 
         Args:
             state: at which they are linearized.

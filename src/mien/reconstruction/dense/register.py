@@ -87,12 +87,16 @@ def register_views(
     """Cameras and shape from all the skin that the photos share, from coarse to fine.
 
     Args:
+        views: K photos.
         cameras: from landmarks, within some 15 degrees.
         vertices: from landmarks, within some 15 degrees.
         features: landmarks and marks of the same photos. Landmarks tell what point of the mesh is
             which, and lead the camera of a photo that shares too little with the others; marks lead
             all cameras, and the head passes through them in the end.
+        focal: which photos share a focal length, and their priors.
+        generic: the generic head.
         scales: mm a px, from round to round.
+        progress: called with steps done and their total.
 
     Returns:
         None where the photos share too little that looks alike.

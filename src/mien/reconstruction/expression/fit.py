@@ -149,7 +149,11 @@ def _inconsistent_photos(
     """Photos whose skin is not neutral's: what was found again contradicts itself or the marks.
 
     Args:
+        observations: features, then skin.
         first: number of the first sighting of skin.
+        found: the fit to all of them.
+        by_marks: the fit to the features alone.
+        known: the neutral head.
     """
     errors = reproject(observations, observations.on(found.vertices(known)), found.cameras)
     inconsistent = []

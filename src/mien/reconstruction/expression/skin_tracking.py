@@ -41,8 +41,12 @@ def track_skin(
     measures what is left.
 
     Args:
+        view: a photo of the expression.
+        camera: of the photo.
         vertices: (V, 3) mm, the expression as known so far.
+        known: the neutral head.
         photo: number of the view among the expression's photos.
+        mm_per_px: scale at which to match.
 
     Returns:
         None where too little looks alike.

@@ -54,8 +54,11 @@ def fit_unit_weights(
     weights stay within 0 and 1.2.
 
     Args:
+        observations: of all photos.
+        start: initial values.
         expected: (52,) what the detector says of the units.
         focal_sd: (K,) standard deviation of log focal lengths.
+        known: the neutral head.
         free: (52,) the units to solve for; the others stay at 0.
     """
     from scipy.optimize import lsq_linear

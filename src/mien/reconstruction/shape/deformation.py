@@ -38,6 +38,7 @@ def deform_head(
         vertices: (V, 3) mm, the shape so far.
         places: (N, 3) mm, the features on it.
         goals: (N, 3) mm, where they belong.
+        generic: the generic head.
         deviation_mm: how well a goal is known; 0 meets it exactly.
         kernel: as in fit_rbf.
 
@@ -98,6 +99,7 @@ def vertex_uncertainty(
     """(V,) mm: near a feature what is known of it, far from all what the prior leaves open.
 
     Args:
+        vertices: (V, 3) mm.
         places: (N, 3) mm.
         deviation_mm: (N,) of the features there.
         prior_mm: deviation of a place that nothing tells about.

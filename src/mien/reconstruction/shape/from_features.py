@@ -38,7 +38,12 @@ def shape_from_features(
     then put on their ray next to where the head has come to lie, as often as `rounds` says.
 
     Args:
+        features: of K photos.
         points: (N, 3) mm, where the features seen twice lie.
+        cameras: of the photos.
+        generic: the generic head.
+        kernel: as in fit_rbf.
+        rounds: repetitions for features seen once.
 
     Source:
         [Pighin 2002] sec. 5.1.3, repeated; the identity basis beneath is ours.

@@ -40,6 +40,9 @@ def deform_skin(
 
     Args:
         vertices: (V, 3) mm, the head so far.
+        observations: of the skin.
+        cameras: of the photos.
+        generic: the generic head.
         held: (V,) in [0, 1]: where skin is to stay.
         across_sd_mm: how far the skin may move along its normals; None leaves it free.
     """
