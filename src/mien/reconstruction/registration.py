@@ -49,7 +49,7 @@ def register_solution(
     generic: GenericHead,
     progress: StepProgress | None = None,
 ) -> Solution:
-    """The solution by all the skin that its photos share, with the photos placed by it added.
+    """The solution by all the skin that its photos share, with the photos localized by it added.
 
     Args:
         solution: from marks and landmarks.
@@ -78,7 +78,7 @@ def register_solution(
             cameras=added,
             residuals=residuals_of(features, added, solution.vertices),
         )
-        # The others are where they belong: the closer looks are enough.
+        # The others are registered already: the finer scales are enough.
         solution = _registered(wider, generic, SCALES_MM[2:], progress)
     return replace(solution, problems=solution.problems | missing)
 

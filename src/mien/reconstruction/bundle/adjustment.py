@@ -80,7 +80,7 @@ class Adjustment:
         converged: of the solver.
         point_sd_mm: (N,) standard deviation of a point (all three axes together) at the given
             sigma_px and priors, as are the next two. Infinite where the data leave it open. Without
-            a shape prior they are those after the points seen twice are aligned by a similarity.
+            a shape prior, after the points observed twice are aligned by a similarity.
         rotation_sd: (K,) radians.
         focal_sd: (K,) relative.
     """
