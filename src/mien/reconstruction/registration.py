@@ -49,11 +49,13 @@ def register_solution(
     generic: GenericHead,
     progress: StepProgress | None = None,
 ) -> Solution:
-    """The solution by all the skin that its photos share, with the photos placed by it added.
+    """The solution by all the skin that its photos share, with the photos localized by it added.
 
     Args:
         solution: from marks and landmarks.
         faceless: photos of the same expression in which nothing is marked.
+        generic: the generic head.
+        progress: called with steps done and their total.
     """
     solution = _registered(solution, generic, SCALES_MM, progress)
     if not faceless:
@@ -76,7 +78,7 @@ def register_solution(
             cameras=added,
             residuals=residuals_of(features, added, solution.vertices),
         )
-        # The others are where they belong: the closer looks are enough.
+        # The others are registered already: the finer scales are enough.
         solution = _registered(wider, generic, SCALES_MM[2:], progress)
     return replace(solution, problems=solution.problems | missing)
 
@@ -103,7 +105,7 @@ def _registered(
     if found is None:
         return replace(solution, uncertainty_mm=deviation_from_features(*known), notes=notes)
     residuals = residuals_of(solution.features, found.cameras, found.vertices)
-    if _edge_misfit(solution, found, residuals) > MAX_EDGE_RESIDUAL:
+    if _edge_residual(solution, found, residuals) > MAX_EDGE_RESIDUAL:
         return replace(
             solution,
             uncertainty_mm=deviation_from_features(*known),
@@ -122,13 +124,10 @@ def _registered(
     )
 
 
-def _edge_misfit(
+def _edge_residual(
     solution: Solution, found: Registration, residuals: Float[Array, "k n 2"]
 ) -> float:
-    """How many expected errors the landmarks on edges lie off the registered head's, in the median;
-
-    0 without landmarks.
-    """
+    """Median normalized residual of the landmarks on edges; 0 without landmarks."""
     features = solution.features
     used = features.observed & features.on_edges
     if not used.any():

@@ -63,6 +63,8 @@ def _fit_sphere(
     """Centre and radius at which the lids lie radius + gap off, near what is given (Gauss-Newton).
 
     Args:
+        lids: (L, 3) mm.
+        gap: (L,) mm, distances of the lids from the ball.
         centre: where the skin around the ball has carried it.
         radius: mm, a prior_mean one.
     """

@@ -49,6 +49,7 @@ class SurfaceCrop:
 
     @classmethod
     def of(cls, crop: Crop, mesh: Mesh, normals: Float[Array, "v 3"]) -> SurfaceCrop:
+        """The surface of a mesh as the crop's camera sees it."""
         both = np.concatenate([mesh.vertices, normals], axis=1)
         at = interpolate(crop.raster, mesh.triangles, both)
         points, normal = np.ascontiguousarray(at[..., :3]), at[..., 3:]
@@ -103,9 +104,11 @@ def match_crops(a: SurfaceCrop, b: SurfaceCrop, *, fine: bool = False) -> Match 
 def match_both(
     a: SurfaceCrop, b: SurfaceCrop, *, fine: bool = False
 ) -> tuple[CheckedMatch, CheckedMatch] | None:
-    """a's pixels in b and b's in a, checked by each other; None where they share nothing.
+    """Pixels of a in b and of b in a, checked by each other; None where they share nothing.
 
     Args:
+        a: one photo.
+        b: the other.
         fine: as in optical_flow.
     """
     there, back = run_concurrently(

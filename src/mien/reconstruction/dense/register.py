@@ -87,23 +87,27 @@ def register_views(
     """Cameras and shape from all the skin that the photos share, from coarse to fine.
 
     Args:
+        views: K photos.
         cameras: from landmarks, within some 15 degrees.
         vertices: from landmarks, within some 15 degrees.
         features: landmarks and marks of the same photos. Landmarks tell what point of the mesh is
             which, and lead the camera of a photo that shares too little with the others; marks lead
             all cameras, and the head passes through them in the end.
+        focal: which photos share a focal length, and their priors.
+        generic: the generic head.
         scales: mm a px, from round to round.
+        progress: called with steps done and their total.
 
     Returns:
         None where the photos share too little that looks alike.
     """
-    tell = progress or no_step_progress
+    progress = progress or no_step_progress
     prior = load_head_prior()
     problem = _Problem(views, features, focal, generic, prior, _rotations(cameras))
     state = _State(tuple(cameras), vertices)
     scales = _useful(scales, cameras)
     for step, scale in enumerate(scales):
-        tell(step, len(scales) + 1)
+        progress(step, len(scales) + 1)
         for _ in range(COARSE_ROUNDS if step == 0 else 1):
             before, tracks = state.cameras, problem.tracks(state, scale, POINTS)
             if len(tracks.corners) < MIN_TRACKED_POINTS:
@@ -111,7 +115,7 @@ def register_views(
             state, solution = problem.round(state, tracks)
             if _largest_turn(before, state.cameras) < CONVERGED_RAD:
                 break
-    tell(len(scales), len(scales) + 1)
+    progress(len(scales), len(scales) + 1)
     finest = problem.tracks(state, max(FINEST_MM, finest_mm_per_px(state.cameras)), FINE_POINTS)
     vertices, offsets = problem.moved(state.vertices, finest, state.cameras)
     vertices = fit_eyeballs(_on_marks(vertices, features, state.cameras, generic), generic)
@@ -119,7 +123,7 @@ def register_views(
     deviation = vertex_deviation(
         solution.covariance[-count:, -count:], prior, finest, offsets, generic
     )
-    tell(len(scales) + 1, len(scales) + 1)
+    progress(len(scales) + 1, len(scales) + 1)
     quality = assess_registration(tracks, solution, generic)
     return Registration(state.cameras, vertices, deviation, quality)
 

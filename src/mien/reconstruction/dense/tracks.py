@@ -84,9 +84,12 @@ def find_tracks(
     the way back from b to a agrees and both surroundings look alike.
 
     Args:
+        views: K photos.
+        cameras: of the photos.
         mesh: what the photos show (crops.visible_mesh).
         mm_per_px: scale at which to match.
         points: about how many to follow, over all photos.
+        neighbours: about how many others each photo is matched with.
         fine: as in optical_flow.
     """
     share = points / max(1, len(views))

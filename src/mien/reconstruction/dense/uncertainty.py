@@ -33,6 +33,10 @@ def vertex_deviation(
 
     Args:
         covariance: (C, C) of the prior's coefficients.
+        prior: of the shape.
+        tracks: of the last matching.
+        offsets: of the tracks from the surface.
+        generic: the generic head.
     """
     of_coefficients = _spread(covariance, prior.components)
     heights = sample_heights(tracks, offsets, generic, draws=_DRAWS)

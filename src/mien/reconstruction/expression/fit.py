@@ -47,9 +47,9 @@ INCONSISTENT_SKIN = (
     "{}: its skin does not look like neutral's: its shape rests on landmarks and marks"
 )
 _UNOBSERVED = ("eyeLook", "tongueOut")
-"""Units that landmarks do not tell: gaze has the irises, the tongue has nothing."""
+"""Units without landmarks: gaze is measured by the irises, the tongue by nothing."""
 _CLOSED = 0.5
-"""Weight of a blink at which an iris cannot be seen any more."""
+"""Weight of a blink from which on an iris is hidden."""
 
 
 def fit_expression(
@@ -59,10 +59,10 @@ def fit_expression(
 
     Cameras and units come together from landmarks and marks, then again with the skin that is
     found again from the neutral photos; what is left moves the skin smoothly. Depth that the
-    photos do not tell is the units'.
+    photos leave open is the units'.
 
     Raises:
-        EstimationError: no photo can be used; says why, of each.
+        EstimationError: no photo can be used; with the reason for each.
 
     Source:
         [Pighin 2002] sec. 5.1 with the neutral head as the prior; the units and the dense matching
@@ -70,7 +70,7 @@ def fit_expression(
     """
     from threadpoolctl import threadpool_limits
 
-    tell = progress or no_step_progress
+    progress = progress or no_step_progress
     left_out = {view.photo.name: NO_FACE_FOUND for view in views if not view.marked}
     views = [view for view in views if view.marked]
     counts = gather_features(views, known.generic).observed.sum(axis=1) if views else []
@@ -80,11 +80,11 @@ def fit_expression(
     views = [view for view in views if view.photo.name not in left_out]
     with threadpool_limits(1, user_api="blas"):
         while views:
-            found = _fit(views, known, tell)
-            misfit = find_outlier_photo(found.median_normalized_residuals)
-            if misfit is None:
+            found = _fit(views, known, progress)
+            outlier = find_outlier_photo(found.median_normalized_residuals)
+            if outlier is None:
                 return replace(found.fit, left_out=left_out)
-            worst, why = misfit
+            worst, why = outlier
             left_out[views[worst].photo.name] = why
             views = [view for k, view in enumerate(views) if k != worst]
     raise EstimationError("; ".join(f"{name}: {why}" for name, why in left_out.items()))
@@ -98,7 +98,9 @@ class _FitWithResiduals:
     median_normalized_residuals: Float[Array, " k"]
 
 
-def _fit(views: Sequence[CapturedView], known: KnownHead, tell: StepProgress) -> _FitWithResiduals:
+def _fit(
+    views: Sequence[CapturedView], known: KnownHead, progress: StepProgress
+) -> _FitWithResiduals:
     generic = known.generic
     features = gather_features(views, generic)
     focal, focal_sd = _focal_lengths(views, known)
@@ -114,7 +116,7 @@ def _fit(views: Sequence[CapturedView], known: KnownHead, tell: StepProgress) ->
     found = by_marks = refit(observations, start)
     vertices, everything, held = found.vertices(known), observations, _held(generic)
     for step, scale in enumerate(TRACKING_MM_PER_PX):
-        tell(step, len(TRACKING_MM_PER_PX))
+        progress(step, len(TRACKING_MM_PER_PX))
         vertices = deform_skin(vertices, everything, found.cameras, generic, held=held)
         everything = _with_skin(observations, views, found.cameras, vertices, known, scale)
         found = refit(everything, found)
@@ -126,7 +128,7 @@ def _fit(views: Sequence[CapturedView], known: KnownHead, tell: StepProgress) ->
             found = refit(everything, by_marks)
         vertices = found.vertices(known)
     vertices = deform_skin(vertices, everything, found.cameras, generic, held=held)
-    tell(len(TRACKING_MM_PER_PX), len(TRACKING_MM_PER_PX))
+    progress(len(TRACKING_MM_PER_PX), len(TRACKING_MM_PER_PX))
     residuals = residuals_of(features, found.cameras, vertices)
     sigma_px = features.sigma_px(found.cameras)
     photos = {
@@ -146,10 +148,14 @@ def _inconsistent_photos(
     by_marks: UnitFit,
     known: KnownHead,
 ) -> list[int]:
-    """Photos whose skin is not neutral's: what was found again contradicts itself or the marks.
+    """Photos whose skin is not neutral's: its matches contradict each other or the marks.
 
     Args:
-        first: number of the first sighting of skin.
+        observations: features, then skin.
+        first: index of the first observation of skin.
+        found: the fit to all of them.
+        by_marks: the fit to the features alone.
+        known: the neutral head.
     """
     errors = reproject(observations, observations.on(found.vertices(known)), found.cameras)
     inconsistent = []

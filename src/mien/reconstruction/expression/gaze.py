@@ -48,6 +48,7 @@ def direction_to_iris(
     A ray that misses the ball grazes it.
 
     Args:
+        camera: of the photo.
         image_point: (2,) px.
         centre: (3,) mm, head space.
         radius: mm.

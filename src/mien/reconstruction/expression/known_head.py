@@ -15,12 +15,12 @@ from mien.reconstruction.features import EDGE_SIGMA_MM, Features, gather_feature
 from mien.reconstruction.observations import SurfaceObservations
 
 EXPRESSED_EDGE_MM = 0.8
-"""How far a landmark on an edge lies off its place on this person's head, once that is known."""
+"""Standard deviation of a landmark on an edge from its known point on this person's head."""
 EXPRESSED_SKIN_MM = 2.5
-"""The same for one on plain skin, which the detector guesses from the edges."""
+"""The same for one on plain skin, which the detector interpolates from the edges."""
 _SHRINKAGE = 1.25
-"""Confidence, summed over neutral photos, at which half of what they say of a landmark's place is
-believed: one says little, for landmarks slide from view to view."""
+"""Confidence, summed over neutral photos, at which half of a landmark's mean offset is used:
+one photo is weak evidence, for landmarks slide from view to view."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,10 @@ class KnownHead:
 
 
 def feature_observations(features: Features, known: KnownHead) -> SurfaceObservations:
-    """Landmarks and marks of an expression's photos, corrected by what the neutral ones say.
+    """Landmarks and marks of an expression's photos, less their offsets in the neutral ones.
 
-    A detector means by a landmark a place that differs from person to person, but hardly between a
-    person's expressions: where the neutral photos show it off its attachment, it is there in the
-    others, too.
+    A landmark lies at a point that differs from person to person, but hardly between a person's
+    expressions: where the neutral photos show it off its attachment, the others do, too.
     """
     # Irises lie on the eyeballs, which turn by themselves.
     on_face = known.generic.regions["face"][features.corners].max(axis=1) > 0

@@ -19,7 +19,7 @@ from mien.reconstruction.expression.known_head import KnownHead
 from mien.reconstruction.observations import SurfaceObservations
 
 MATCHED_SIGMA_MM = 0.4
-"""Error of skin found again: wrinkles and light change what it looks like."""
+"""Standard deviation of matched skin, whose look changes with wrinkles and light."""
 _POINTS = 1500
 _PATCH_PX, _MIN_STEP_PX = 8, 2
 """Side of what is matched at once, and how near to each other two points are followed at most."""
@@ -41,11 +41,15 @@ def track_skin(
     measures what is left.
 
     Args:
+        view: a photo of the expression.
+        camera: of the photo.
         vertices: (V, 3) mm, the expression as known so far.
+        known: the neutral head.
         photo: number of the view among the expression's photos.
+        mm_per_px: scale at which to match.
 
     Returns:
-        None where too little looks alike.
+        None where too little matches.
     """
     nearest = _nearest(camera, known)
     still = visible_mesh(known.generic, known.vertices)
@@ -80,8 +84,8 @@ def track_skin(
 def _rigid_skin(generic: GenericHead) -> Bool[Array, " v"]:
     """(V,) skin that goes with the head: the neck turns by itself, hair has no surface."""
     regions = generic.regions
-    apart = regions["neck"] + regions["scalp"] + regions["left_ear"] + regions["right_ear"]
-    return (regions["face"] > 0) & (apart < 0.5) & (regions["eye_socket"] < 1)
+    excluded = regions["neck"] + regions["scalp"] + regions["left_ear"] + regions["right_ear"]
+    return (regions["face"] > 0) & (excluded < 0.5) & (regions["eye_socket"] < 1)
 
 
 def _nearest(camera: Camera, known: KnownHead) -> int:

@@ -14,7 +14,7 @@ from mien.reconstruction.expression.known_head import KnownHead
 from mien.reconstruction.observations import SurfaceObservations, reproject
 
 UNIT_SD = 0.35
-"""How far a unit's weight lies off what the detector's scores say."""
+"""Standard deviation of a unit's weight from the detector's score."""
 MAX_WEIGHT = 1.2
 """A unit goes no farther than this."""
 _ROUNDS = 12
@@ -54,8 +54,11 @@ def fit_unit_weights(
     weights stay within 0 and 1.2.
 
     Args:
-        expected: (52,) what the detector says of the units.
+        observations: of all photos.
+        start: initial values.
+        expected: (52,) units by the detector's scores.
         focal_sd: (K,) standard deviation of log focal lengths.
+        known: the neutral head.
         free: (52,) the units to solve for; the others stay at 0.
     """
     from scipy.optimize import lsq_linear
@@ -68,10 +71,10 @@ def fit_unit_weights(
     for _ in range(_ROUNDS):
         matrix, gradient = _normal_equations(observations, state, rest, basis, units)
         count = len(state.cameras)
-        lens = CAMERA_SIZE * np.arange(count) + CAMERA_SIZE - 1
+        focal_rows = CAMERA_SIZE * np.arange(count) + CAMERA_SIZE - 1
         now = np.log([camera.focal_px for camera in state.cameras])
-        matrix[lens, lens] += 1 / focal_sd**2
-        gradient[lens] += (now - focal) / focal_sd**2
+        matrix[focal_rows, focal_rows] += 1 / focal_sd**2
+        gradient[focal_rows] += (now - focal) / focal_sd**2
         own = CAMERA_SIZE * count + np.arange(len(units))
         matrix[own, own] += 1 / UNIT_SD**2
         gradient[own] += (state.weights[units] - expected[units]) / UNIT_SD**2

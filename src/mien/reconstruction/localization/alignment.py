@@ -68,7 +68,9 @@ def align(
     """The photo matched with the head as the camera sees it; None where it hardly does.
 
     Args:
+        photo: pixels.
         camera: of the photo, to within some 20 degrees.
+        renderer: of the head.
         resolution: px of the rendering per mm.
     """
     import cv2

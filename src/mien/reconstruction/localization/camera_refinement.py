@@ -9,9 +9,10 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.camera import Camera
-from mien.numeric.rotation import cross_matrix, rotation_from_vector
+from mien.numeric.rotation import rotation_from_vector
 from mien.numeric.solvers.levenberg_marquardt import minimize_lm
 from mien.numeric.solvers.robust import loss_named
+from mien.reconstruction.bundle.projection import PinholeArrays, project_points
 
 _NEAREST_MM = 150.0
 """No photo of a head is taken from nearer by."""
@@ -95,11 +96,8 @@ def _moved(camera: Camera, step: Float[Array, " 7"]) -> Camera:
 
 def _jacobian(camera: Camera, points: Float[Array, "n 3"]) -> Float[Array, "n 2 7"]:
     """Derivatives of the projection by a rotation after R, by t and by log focal length."""
-    turned = points @ camera.R_cam_head.T
-    x, y, z = (turned + camera.t_cam_head).T
-    by_point = np.zeros((len(points), 2, 3))
-    by_point[:, 0, 0] = by_point[:, 1, 1] = camera.focal_px / z
-    by_point[:, 0, 2] = -camera.focal_px * x / z**2
-    by_point[:, 1, 2] = -camera.focal_px * y / z**2
-    by_focal = camera.focal_px * np.column_stack([x, y])[..., None] / z[:, None, None]
-    return np.concatenate([-by_point @ cross_matrix(turned), by_point, by_focal], axis=2)
+    photo = np.zeros(len(points), np.int64)
+    projection = project_points(PinholeArrays.of([camera]), photo, points)
+    jacobian = projection.camera_jacobian()
+    jacobian[..., 5] = projection.rotated_jacobian[..., 2]
+    return jacobian

@@ -56,7 +56,9 @@ def initial_cameras(
     is an accident (measured with EPnP); a shift, turn and scale is not.
 
     Args:
+        grey: the photo.
         template: gives the photo's focal length, principal point and, roughly, the head's scale.
+        references: renderings of the head.
         center: (3,) mm, of the head.
     """
     keypoints = find_keypoints(grey)

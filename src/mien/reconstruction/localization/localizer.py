@@ -50,8 +50,10 @@ def localize_view(
     rendering by that camera, and the best is accepted only if enough of the head matches.
 
     Args:
+        view: the photo.
         others: photos of the same person with the same expression, and their cameras.
         vertices: (V, 3) mm, the head that those cameras belong to, head space.
+        generic: the generic head.
 
     Returns:
         the camera, good to a degree or two; None where there is no clear evidence for any.

@@ -48,10 +48,7 @@ class PhotoRendering:
 
 @dataclass(frozen=True)
 class _PreparedPhoto:
-    """A reduced photo with its camera, the depth of its pixels, and how far (0 to 1) they are from
-
-    an edge.
-    """
+    """A reduced photo, its camera, and depth and clearance of edges (0 to 1) by pixel."""
 
     grey: Float[Array, "h w"]
     camera: Camera

@@ -137,6 +137,9 @@ def rms_per_photo(
     """Root mean square length of each photo's inlier reprojection errors, px.
 
     Args:
+        problem: what was solved.
+        solution: of it.
+        inliers: (K, N) observations that count.
         weighted: count an error as what it would be for an observation of the largest weight.
     """
     squared = np.where(inliers, residual_lengths(problem, solution) ** 2, 0.0)

@@ -108,6 +108,8 @@ def recover_pose(
         history: sweeps that the acceleration remembers; 0 is [Pighin 2002]'s plain iteration.
         max_misfit_mm: a photo whose points lie farther (robust deviation) off the initial shape's
             best view shows something else.
+        max_sweeps: of each stage, at most.
+        tolerance: relative decrease of the cost at which a stage has settled.
 
     Raises:
         InputError: shapes, NaN, negative weights.

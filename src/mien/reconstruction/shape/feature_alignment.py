@@ -38,6 +38,7 @@ def align_features(
         vertices: (V, 3) mm.
         features: of K photos.
         cameras: of K photos.
+        generic: the generic head.
         measured: the surface is known from several photos and stays where it is; else what one
             photo shows moves the head across it.
     """
