@@ -23,7 +23,7 @@ CURVE_SIGMA_MM = 1.0
 EDGE_SIGMA_MM = 2.5
 """How far a landmark on an eye, brow, lip or the nose slides over the skin between views."""
 SKIN_SIGMA_MM = 12.0
-"""The same for one on plain skin, which the detector only guesses (docs/method/cameras.md)."""
+"""The same for one on plain skin, which the detector only interpolates (docs/method/cameras.md)."""
 MIN_CONFIDENCE = 0.1
 """Landmarks below are not used: the surface turns away there."""
 MIN_NAMED_POINTS = 8
