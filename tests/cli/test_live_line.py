@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from mien.cli.live_line import live_line, status_text, summary_text
-from mien.pipelines.tracking.live_tracker import LiveStatus, LiveSummary
+from mien.pipelines.tracking.live_loop import LiveStatus, LiveSummary
 
 STATUS = LiveStatus(120, "reacquired", 29.84, 0.0412, 3)
 

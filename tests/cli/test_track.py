@@ -15,9 +15,9 @@ from mien.arrays import Array
 from mien.io.head.head_folder import load_head
 from mien.io.tracks.track_csv import load_track
 from mien.pipelines.track import Tracked
-from mien.pipelines.tracking.live_tracker import LiveSummary
+from mien.pipelines.tracking.live_loop import LiveSummary
 from mien.pipelines.tracking.outputs import TrackFiles
-from mien.pipelines.tracking.ready_head import ReadyHead
+from mien.pipelines.tracking.prepared_head import PreparedHead
 from mien.render.picture import HeadRenderer
 from mien.rig.state import FaceState
 from mien.track.state import TrackedFrame
@@ -55,7 +55,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
         counts = {"ok": 443, "reacquired": 2, "lost": 3}
         return Tracked(448, counts, 0, 31.24, 6.12, 800.0, ("a note",))
 
-    def live(*arguments: Any, tell: object, **options: Any) -> LiveSummary:
+    def live(*arguments: Any, on_status: object, **options: Any) -> LiveSummary:
         calls.append((*arguments, options))
         return LiveSummary(300, 4, 3, 10.0, 29.9, 0.0412, ("another note",))
 
@@ -230,7 +230,7 @@ def test_stopped_and_resumed(
     clip: Path, expressive: Path, mien: Mien, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tracker = Counting()
-    monkeypatch.setattr(ReadyHead, "tracker", lambda ready, *size: tracker)
+    monkeypatch.setattr(PreparedHead, "tracker", lambda prepared, *size: tracker)
     command = ("track", clip, "--head", expressive, "--lens", LENS, "-o")
     assert mien(*command, tmp_path / "whole.csv").status == 0
     tracker.stops_at = 3

@@ -15,7 +15,7 @@ from mien.errors import InputError
 from mien.io.tracks.track_csv import load_track
 from mien.pipelines.live import track_live_video, warm_up
 from mien.pipelines.tracking.outputs import TrackFiles
-from mien.pipelines.tracking.ready_head import ReadyHead
+from mien.pipelines.tracking.prepared_head import PreparedHead
 from mien.render.picture import HeadRenderer
 from mien.track.lens import expected_focal
 from mien.track.smoothing import LiveFilter
@@ -67,12 +67,12 @@ class Nobody:
 def spy(monkeypatch: pytest.MonkeyPatch) -> Spy:
     """In the place of the tracker; warming it up takes no time."""
     one = Spy()
-    monkeypatch.setattr(ReadyHead, "tracker", lambda ready, *size: one.tracker(*size))
+    monkeypatch.setattr(PreparedHead, "tracker", lambda prepared, *size: one.tracker(*size))
     monkeypatch.setattr(mien.pipelines.live, "HeadRenderer", lambda *rest, **more: None)
     monkeypatch.setattr(mien.pipelines.live, "warm_up", lambda *rest: None)
     monkeypatch.setattr(mien.pipelines.live, "LandmarkDetector", Nobody)
     monkeypatch.setattr(Nobody, "closed", 0)
-    monkeypatch.setattr(ReadyHead, "model", type("Model", (), {"rig": None}))
+    monkeypatch.setattr(PreparedHead, "model", type("Model", (), {"rig": None}))
     return one
 
 

@@ -19,9 +19,9 @@ from mien.camera import FRONTAL
 from mien.errors import EstimationError, FileFormatError, InputError, MienError
 from mien.io.tracks.track_csv import load_track
 from mien.io.tracks.track_journal import journal_of
-from mien.pipelines.track import COUNTED, STARTED_OVER, Tracked, track_video
+from mien.pipelines.track import FRAME_STAGES, STARTED_OVER, Tracked, track_video
 from mien.pipelines.tracking.outputs import TrackFiles
-from mien.pipelines.tracking.ready_head import ReadyHead
+from mien.pipelines.tracking.prepared_head import PreparedHead
 from mien.track.state import Layout, Status, TrackedFrame, TrackState
 from posable import head, head_of
 
@@ -92,7 +92,7 @@ def tracker(monkeypatch: pytest.MonkeyPatch) -> type[BrightnessTracker]:
         def __exit__(self, *error: object) -> None:
             return None
 
-    monkeypatch.setattr(ReadyHead, "tracker", Fresh)
+    monkeypatch.setattr(PreparedHead, "tracker", Fresh)
     monkeypatch.setattr(mien.pipelines.track, "LandmarkDetector", Nobody)
     monkeypatch.setattr(mien.pipelines.track, "turn_upright", lambda *rest: False)
     monkeypatch.setattr(mien.pipelines.track, "find_focal", lambda *rest: (100.0, "of the lens"))
@@ -291,7 +291,7 @@ def test_all_that_can_be_written(clip: Path, tmp_path: Path) -> None:
     told: list[str] = []
     track_video(clip, head(), files, progress=lambda stage, done, total: told.append(stage))
     assert list(dict.fromkeys(told)) == ["Tracking", "Drawing the overlay", "Drawing plots"]
-    assert set(told) - set(COUNTED) == {"Drawing plots"}
+    assert set(told) - set(FRAME_STAGES) == {"Drawing plots"}
     assert (tmp_path / "plots" / "index.html").exists()
     for name in ("l.csv", "f.csv"):
         assert len((tmp_path / name).read_text().splitlines()) == 13

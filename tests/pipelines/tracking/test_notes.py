@@ -11,7 +11,7 @@ import pytest
 from mien.camera import FRONTAL
 from mien.errors import EstimationError
 from mien.head import Head
-from mien.pipelines.tracking.notes import check_found, track_notes
+from mien.pipelines.tracking.notes import check_not_all_lost, track_notes
 from mien.track.state import Track, TrackedFrame, TrackState
 from posable import head
 from tracks import LAYOUT
@@ -82,6 +82,6 @@ def test_a_stranger_is_told_by_the_usual_error() -> None:
 )
 def test_all_lost(met_others: bool, table: Path | None, message: str) -> None:
     with pytest.raises(EstimationError, match=message):
-        check_found(track_of(lost(0), lost(1)), "a.mp4", table, met_others=met_others)
-    check_found(track_of(lost(0), shown(1)), "a.mp4", table, met_others=met_others)
-    check_found(track_of(), "a.mp4", table, met_others=met_others)
+        check_not_all_lost(track_of(lost(0), lost(1)), "a.mp4", table, met_others=met_others)
+    check_not_all_lost(track_of(lost(0), shown(1)), "a.mp4", table, met_others=met_others)
+    check_not_all_lost(track_of(), "a.mp4", table, met_others=met_others)
