@@ -147,7 +147,7 @@ def test_a_table_of_all_frames(clip: Path, tmp_path: Path) -> None:
         (Tracked(2, {"ok": 0, "reacquired": 0, "lost": 2}, 0, None, None, 800), "2 frames, 2 lost"),
     ],
 )
-def test_what_the_terminal_says(tracked: Tracked, text: str) -> None:
+def test_text_of_the_summary(tracked: Tracked, text: str) -> None:
     assert str(tracked) == text
 
 
@@ -273,7 +273,7 @@ def test_one_frame(tmp_path: Path) -> None:
     assert len((tmp_path / "l.csv").read_text().splitlines()) == 2
 
 
-def test_nobody_there(tmp_path: Path) -> None:
+def test_clip_without_a_face(tmp_path: Path) -> None:
     files = everything(tmp_path)
     clip = written(tmp_path / "a.mp4", grey([5] * 4))
     told = f"{clip}: expected the head's face, found in none of 4 frames: no face was there; "
@@ -367,7 +367,7 @@ def test_bad_options(
     assert tracker.made == 0
 
 
-def test_what_is_no_video(tmp_path: Path, tracker: type[BrightnessTracker]) -> None:
+def test_files_that_are_no_video(tmp_path: Path, tracker: type[BrightnessTracker]) -> None:
     cases: list[tuple[str, type[MienError], str]] = [
         ("missing.mp4", InputError, r"missing\.mp4: expected a video, got no such file"),
         ("text.mp4", FileFormatError, r"text\.mp4: expected a video, found a text file"),

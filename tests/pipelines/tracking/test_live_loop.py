@@ -118,7 +118,7 @@ def tracker(clock: Clock, rng: np.random.Generator) -> Tracker:
     return Tracker(clock, rng)
 
 
-def test_every_picture_is_tracked_sent_recorded_and_told(clock: Clock, tracker: Tracker) -> None:
+def test_every_picture_is_tracked_sent_and_reported(clock: Clock, tracker: Tracker) -> None:
     source, receivers = Source(clock), [Receiver(), Receiver()]
     tracker.lost = (3,)
     recorded: list[TrackedFrame] = []
@@ -191,7 +191,7 @@ def test_an_error_is_not_swallowed_and_the_source_is_closed(clock: Clock, tracke
     assert source.closed
 
 
-def test_a_moment_is_what_the_camera_sees(rng: np.random.Generator) -> None:
+def test_moment_is_relative_to_a_frontal_head(rng: np.random.Generator) -> None:
     turned = head_rotation(0.3, -0.2, 0.1)
     state = TrackState(
         R_cam_head=FRONTAL @ turned,
@@ -222,7 +222,7 @@ def test_a_video_stands_in_for_the_camera(
     assert summary.fps == pytest.approx(10)
 
 
-def test_what_a_source_is_called(tmp_path: Path) -> None:
+def test_names_of_live_sources(tmp_path: Path) -> None:
     path = written(tmp_path / "a.mp4", grey([20, 60]))
     assert isinstance(open_live_source(str(path)), PacedVideo)
     with pytest.raises(InputError, match="camera 99: expected a camera that is connected"):

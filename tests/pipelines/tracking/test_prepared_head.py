@@ -19,7 +19,7 @@ from mien.track.tracker import TrackOptions
 from posable import head
 
 
-def test_lens_and_tracker_share_what_is_slow(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_model_and_head_detector_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[str] = []
 
     def counted(name: str) -> None:
@@ -49,7 +49,7 @@ def test_a_unit_that_the_head_lacks() -> None:
         _ = prepared.head_detector
 
 
-def test_every_fifth_of_the_first_frames_is_looked_at(
+def test_focal_length_is_estimated_from_every_fifth_frame(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[Array] = []

@@ -157,7 +157,7 @@ def test_a_journal_of_more_frames_than_the_clip_has(
     assert not files.table.exists()
 
 
-def test_heads_are_told_apart(filmed: Filmed) -> None:
+def test_digests_of_different_heads_differ(filmed: Filmed) -> None:
     assert head_digest(filmed.head) == head_digest(filmed.head) != head_digest(other_head())
 
 
@@ -165,7 +165,7 @@ def test_heads_are_told_apart(filmed: Filmed) -> None:
     ("times", "rate"),
     [([], 25), ([3.0], 25), ([0.0, 0.0], 25), ([0, 0.04001, 0.08], 25), ([0, 0.1, 0.3], 20 / 3)],
 )
-def test_mean_rate(times: list[float], rate: float) -> None:
+def test_mean_fps(times: list[float], rate: float) -> None:
     unknown = np.empty(0)
     frames = [
         TrackedFrame(number, time, "lost", None, np.nan, 0.0, unknown, unknown, unknown)
@@ -232,7 +232,7 @@ def test_a_clip_of_somebody_else_alone(filmed: Filmed, shared: Path, tmp_path: P
     assert [item.status for item in load_track(tmp_path / "t.csv").frames] == ["lost"] * 3
 
 
-def test_a_face_that_the_edge_cuts_is_told_of_once(filmed: Filmed, tmp_path: Path) -> None:
+def test_one_note_on_a_face_that_the_edge_cuts(filmed: Filmed, tmp_path: Path) -> None:
     cut = [pixels[:, WIDTH // 2 - 40 :] for pixels in filmed.frames[:5]]
     wide = [np.pad(pixels, ((0, 0), (0, 40), (0, 0)), "edge") for pixels in cut]
     tracked = track_video(
