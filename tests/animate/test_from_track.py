@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mien.animate.from_track import FACING, rest_camera, track_moments, track_timeline
-from mien.animate.perform import frames_of, moved_camera
+from mien.animate.perform import frame_times, moved_camera
 from mien.errors import InputError
 from mien.numeric.rotation import rotation_from_vector
 from mien.rig.state import FaceState
@@ -71,7 +71,7 @@ def test_times_count_from_the_first_frame_and_fill_the_video(rng: np.random.Gene
     timeline = track_timeline(track)
     times = [moment.time for moment in track_moments(track)]
     np.testing.assert_allclose(times, np.arange(9) / 25, atol=1e-12)
-    np.testing.assert_allclose(frames_of(timeline), times, atol=1e-12)
+    np.testing.assert_allclose(frame_times(timeline), times, atol=1e-12)
     assert timeline.fps == 25
 
 
@@ -104,7 +104,7 @@ def test_frames_of_one_time_show_the_first(rng: np.random.Generator) -> None:
 def test_one_frame_is_a_performance(rng: np.random.Generator) -> None:
     timeline = track_timeline(track_of([random_state(rng)], rng))
     assert timeline.duration == pytest.approx(1 / 25)
-    assert len(frames_of(timeline)) == 1
+    assert len(frame_times(timeline)) == 1
 
 
 def test_a_track_without_a_face_is_refused(rng: np.random.Generator) -> None:

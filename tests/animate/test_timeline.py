@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mien.animate.channels import head_angles_rad, head_rotation, split
+from mien.animate.channels import head_angles_rad, head_rotation
 from mien.animate.curves import Curve, constant
 from mien.animate.layers import Blink
 from mien.animate.timeline import Clip, Layer, Placement, Timeline
@@ -157,4 +157,4 @@ def test_bad_placements_are_named() -> None:
         Placement("smile", 0, speed=0)
     with pytest.raises(InputError, match="at and weight: expected finite"):
         Placement("smile", float("nan"))
-    assert split("left_mouth.joy") == ("left_mouth", "joy")
+    assert split_channel("left_mouth.joy") == ("left_mouth", "joy")

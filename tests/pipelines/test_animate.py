@@ -13,13 +13,13 @@ import pytest
 from PIL import Image
 
 from glb_file import Glb
-from mien.animate.perform import frames_of
+from mien.animate.perform import frame_times
 from mien.animate.timeline import Timeline
 from mien.arrays import Array
 from mien.head import Head
 from mien.io.head.head_folder import load_head
 from mien.io.timeline.timeline_file import load_timeline
-from mien.pipelines.animate import Take, animate_head
+from mien.pipelines.animate import AnimationResult, animate_head
 from mien.render.picture import HeadRenderer
 from terminal import Mien
 
@@ -147,7 +147,7 @@ def test_live_link_comes_back(expressive: Path, timeline: Path, mien: Mien, tmp_
     out = tmp_path / "a.csv"
     assert mien("animate", timeline, "--head", expressive, "-o", out, "--json").json["frames"] == 5
     given, back = load_timeline(timeline), load_timeline(out)
-    times = frames_of(given)
+    times = frame_times(given)
     wanted, found = given.sample(times), back.sample(times)
     for channel in ("units.jawOpen", "units.eyeBlinkLeft", "head.yaw"):
         np.testing.assert_allclose(found[channel], wanted[channel], atol=1e-6)
@@ -194,7 +194,7 @@ def test_from_python(expressive: Path, tmp_path: Path) -> None:
         size=(32, 40),
         progress=lambda *step: told.append(step),
     )
-    assert take == Take(frames=3)
+    assert take == AnimationResult(frames=3)
     assert told == [("Animating", done, 3) for done in range(4)]
 
 

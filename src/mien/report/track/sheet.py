@@ -15,7 +15,7 @@ from mien.arrays import Array, UInt8
 from mien.head import Head
 from mien.render.picture import GREY, HeadRenderer
 from mien.render.shade import over_background
-from mien.report.sheet import arranged
+from mien.report.sheet import arrange_grid
 from mien.report.track.caption import say_lost, write_on
 from mien.report.track.comparison import draw_tracked
 from mien.report.track.window import window_of
@@ -59,4 +59,4 @@ def contact_sheet(
             below = over_background(drawn.picture, GREY)[..., :3]
         above = write_on(frame, str(found.frame), _WHITE, at=(0.12, 0.06), size=15, outline=2)
         cells.append(np.concatenate([above, below]))
-    return arranged(cells, columns)
+    return arrange_grid(cells, columns)
