@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mien.animate.channels import head_angles_rad, head_rotation
+from mien.animate.channels import head_angles_rad, head_rotation, split_channel
 from mien.animate.curves import Curve, constant
 from mien.animate.layers import Blink
 from mien.animate.timeline import Clip, Layer, Placement, Timeline

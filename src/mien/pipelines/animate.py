@@ -86,9 +86,9 @@ def animate_head(
     read: Iterable[str | Path] = (),
     progress: Progress | None = None,
 ) -> AnimationResult:
-    """Let a head perform a timeline, into a video, pictures, a model or a table.
+    """Animate a head by a timeline, to a video, pictures, a model or a table.
 
-    Frames are made one at a time; what was at the place stays until the new file is whole.
+    Frames are made one at a time; an existing file stays until the new one is complete.
 
     Args:
         head: the head.
@@ -100,7 +100,7 @@ def animate_head(
         yaw: radians, pose of the head at rest; for pictures.
         pitch: as `yaw`.
         background: sRGB. Unless given, pictures and .webm have alpha and an .mp4 a plain grey.
-        read: files and folders beside the timeline that must stay as they are, such as the head's.
+        read: further inputs, such as the head's folder, which must not be overwritten.
         progress: called with the stage, frames done and their total.
 
     Returns:

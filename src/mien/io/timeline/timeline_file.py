@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from mien.animate.channels import CHANNEL_NAMES, REGION_NAMES, UNITS
+from mien.animate.channels import CHANNEL_NAMES, REGION_NAMES, UNITS, split_channel
 from mien.animate.timeline import Timeline, Tracks
 from mien.errors import FileFormatError, InputError
 from mien.reading.strict_json import unknown

@@ -12,7 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from mien.animate.channels import ANGLES, CHANNEL_NAMES, GAZE, HEAD, REGION_NAMES, UNITS
+from mien.animate.channels import (
+    ANGLES,
+    CHANNEL_NAMES,
+    GAZE,
+    HEAD,
+    REGION_NAMES,
+    UNITS,
+    split_channel,
+)
 from mien.animate.curves import Curve
 from mien.animate.layers import GENERATORS, Generator
 from mien.animate.timeline import PIVOT_MM, Clip, Layer, Placement, Timeline, Tracks
