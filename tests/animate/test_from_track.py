@@ -75,7 +75,7 @@ def test_times_count_from_the_first_frame_and_fill_the_video(rng: np.random.Gene
     assert timeline.fps == 25
 
 
-def test_lost_frames_are_bridged_by_their_neighbours(rng: np.random.Generator) -> None:
+def test_lost_frames_are_interpolated(rng: np.random.Generator) -> None:
     first, last = random_state(rng), random_state(rng)
     track = track_of([None, first, None, None, last, None], rng)
     jaw = [moment.state.units["jawOpen"] for moment in track_moments(track)]
@@ -101,7 +101,7 @@ def test_frames_of_one_time_show_the_first(rng: np.random.Generator) -> None:
     assert curve.values.tolist() == [states[0].units[0], states[2].units[0]]
 
 
-def test_one_frame_is_a_performance(rng: np.random.Generator) -> None:
+def test_a_track_of_one_frame(rng: np.random.Generator) -> None:
     timeline = track_timeline(track_of([random_state(rng)], rng))
     assert timeline.duration == pytest.approx(1 / 25)
     assert len(frame_times(timeline)) == 1

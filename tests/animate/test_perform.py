@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from mien.animate.curves import Curve, constant
-from mien.animate.perform import frame_times, moments, moved_camera
+from mien.animate.perform import frame_times, moved_camera
 from mien.animate.timeline import Timeline
 from mien.errors import InputError
 from mien.render.orbit import orbit_camera
+from moments import moments
 
 
 def test_frames_fill_the_duration() -> None:

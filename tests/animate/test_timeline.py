@@ -99,7 +99,7 @@ def test_angles_turn_the_way_the_conventions_say(angles, point, towards) -> None
     assert moved @ np.array(towards) > 0.09
 
 
-def test_angles_come_back(rng: np.random.Generator) -> None:
+def test_angles_round_trip(rng: np.random.Generator) -> None:
     for angles in rng.uniform(-1.4, 1.4, (20, 3)):
         np.testing.assert_allclose(head_angles_rad(head_rotation(*angles)), angles, atol=1e-12)
 

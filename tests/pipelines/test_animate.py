@@ -143,7 +143,7 @@ def middle_of(head: Head) -> Array:
     return (vertices.min(axis=0) + vertices.max(axis=0)) / 2
 
 
-def test_live_link_comes_back(expressive: Path, timeline: Path, mien: Mien, tmp_path: Path) -> None:
+def test_live_link_round_trip(expressive: Path, timeline: Path, mien: Mien, tmp_path: Path) -> None:
     out = tmp_path / "a.csv"
     assert mien("animate", timeline, "--head", expressive, "-o", out, "--json").json["frames"] == 5
     given, back = load_timeline(timeline), load_timeline(out)
@@ -294,7 +294,9 @@ def test_a_rate_that_makes_too_many_frames(expressive: Path, mien: Mien, tmp_pat
     )
 
 
-def test_what_the_recording_is_like_is_noted(expressive: Path, mien: Mien, tmp_path: Path) -> None:
+def test_properties_of_the_recording_are_noted(
+    expressive: Path, mien: Mien, tmp_path: Path
+) -> None:
     path = written(tmp_path)
     mien("animate", path, "--head", expressive, "-o", tmp_path / "a.csv")
     header, *rows = (tmp_path / "a.csv").read_text().splitlines()
@@ -307,7 +309,7 @@ def test_what_the_recording_is_like_is_noted(expressive: Path, mien: Mien, tmp_p
     ]
 
 
-def test_what_is_no_timeline(expressive: Path, mien: Mien, tmp_path: Path) -> None:
+def test_files_that_are_no_timeline(expressive: Path, mien: Mien, tmp_path: Path) -> None:
     for name, message in (("no.json", ""), ("take.txt", "expected a name that ends in .json or")):
         path = tmp_path / name
         error = mien("animate", path, "--head", expressive, "-o", tmp_path / "a.mp4").error

@@ -96,7 +96,7 @@ def test_backgrounds() -> None:
         over_background(half, behind[:10])
 
 
-def test_fine_textures_seen_small_become_their_mean() -> None:
+def test_minified_textures_become_their_mean() -> None:
     mesh = ellipsoid()
     checks = (np.indices((1024, 2048)).sum(axis=0) % 2 * 255).astype(np.uint8)
     texture = np.repeat(checks[..., None], 3, axis=2)

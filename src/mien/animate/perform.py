@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -32,11 +31,6 @@ def frame_times(timeline: Timeline, fps: float | None = None) -> Float[Array, " 
         found = f"{timeline.duration:g} s at {rate:g} frames a second"
         raise InputError("frames", f"at most {MAX_FRAMES}", found)
     return np.arange(count) / rate
-
-
-def moments(timeline: Timeline, fps: float | None = None) -> Iterator[Moment]:
-    """Face and head at every frame."""
-    return timeline.moments_at(frame_times(timeline, fps))
 
 
 def moved_camera(camera: Camera, moment: Moment) -> Camera:

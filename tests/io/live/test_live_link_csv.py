@@ -10,12 +10,13 @@ import pytest
 
 from mien.animate.channels import head_rotation
 from mien.animate.curves import Curve, constant
-from mien.animate.perform import frame_times, moments
+from mien.animate.perform import frame_times
 from mien.animate.timeline import Timeline
 from mien.assets.generic import load_generic_head
 from mien.errors import FileFormatError, InputError
 from mien.io.live.live_link import UNITS
 from mien.io.live.live_link_csv import load_live_link, save_live_link, timecode
+from moments import moments
 
 HEADER = (
     "Timecode,BlendShapeCount,EyeBlinkLeft,EyeLookDownLeft,EyeLookInLeft,EyeLookOutLeft,"
