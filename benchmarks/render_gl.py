@@ -27,7 +27,7 @@ void main() {
     gl_Position = vec4(lens.xy * place.xy + lens.zw * place.z, z, place.z);
 }
 """
-# The same sharpness as mien's: see docs/method/texture.md.
+# The same sharpness as mien's: see docs/method/rendering.md.
 FRAGMENT = """
 #version 330
 uniform sampler2D image;

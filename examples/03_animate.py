@@ -15,7 +15,7 @@ from mien.animate import load_timeline
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("example-head")
 head = load_head(folder)
 
-# Times in seconds, angles in degrees; see docs/animation.md.
+# Times in seconds, angles in degrees; see docs/reference/timeline.md.
 tracks: dict[str, Any] = {
     "head": {"yaw": [[0, 0], [0.8, 15], [2, 0]], "pitch": [[0.8, 0], [1.1, 6], [1.5, 0]]},
     "gaze": {"yaw": [[0.2, 0], [0.3, -10], [1.4, 0]]},

@@ -42,8 +42,8 @@ def check_array(
     """The value as an array of this shape and type.
 
     Args:
-        name: how the message calls the value.
-        value: anything numpy can turn into an array.
+        name: of the value, for messages.
+        value: anything numpy can convert to an array.
         shape: one entry an axis; None accepts any length.
         dtype: the type of the result.
         finite: refuse NaN and infinity.
@@ -51,17 +51,17 @@ def check_array(
     Raises:
         InputError: the shape differs, the type does not convert, a number is not finite.
     """
-    wanted = "(" + ", ".join("any" if length is None else str(length) for length in shape) + ")"
+    expected = "(" + ", ".join("any" if length is None else str(length) for length in shape) + ")"
     try:
         array: Array = np.asarray(value, dtype=dtype)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(name, f"numbers of shape {wanted}", type(value).__name__) from None
+        raise InputError(name, f"numbers of shape {expected}", type(value).__name__) from None
     fits = array.ndim == len(shape) and all(
         length is None or length == actual
         for length, actual in zip(shape, array.shape, strict=True)
     )
     if not fits:
-        raise InputError(name, f"shape {wanted}", f"shape {array.shape}")
+        raise InputError(name, f"shape {expected}", f"shape {array.shape}")
     if finite and array.dtype.kind == "f" and not np.isfinite(array).all():
         bad = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(name, "finite numbers", f"{array[bad]} at index {bad}")
@@ -93,7 +93,7 @@ def check_rotation(name: str, value: object) -> Float[Array, "3 3"]:
 
 
 def frozen(array: Array) -> Array:
-    """The same array, read-only, so that a frozen dataclass is frozen all through."""
+    """A read-only view of the array, for frozen dataclasses."""
     view = array.view()
     view.flags.writeable = False
     return view

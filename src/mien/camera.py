@@ -1,4 +1,4 @@
-"""A pinhole camera that looks at a head."""
+"""A pinhole camera in head space."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mien.arrays import Array, Float, check_array, check_positive, check_rotation, frozen
+
+FRONTAL = frozen(np.diag([1.0, -1.0, -1.0]))
+"""(3, 3) R_cam_head of an upright head that faces the camera."""
 
 
 @dataclass(frozen=True)
@@ -17,8 +20,8 @@ class Camera:
     of the image, centre of the first pixel at (0.5, 0.5).
 
     Attributes:
-        width: image size in px.
-        height: image size in px.
+        width: of the image, px.
+        height: of the image, px.
         focal_px: focal length in px.
         R_cam_head: (3, 3) rotation from head space to camera space.
         t_cam_head: (3,) mm, position of the head's origin in camera space.
@@ -56,7 +59,7 @@ class Camera:
 
     @property
     def center(self) -> Float[Array, " 3"]:
-        """(3,) mm: the camera's place in head space."""
+        """(3,) mm: the camera's position in head space."""
         return -self.R_cam_head.T @ self.t_cam_head
 
     def to_camera(self, points: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
@@ -90,3 +93,16 @@ class Camera:
             focal_px=self.focal_px * factor,
             principal_px=self.principal * factor,
         )
+
+
+def head_angles_deg(camera: Camera) -> tuple[float, float, float]:
+    """Degrees of yaw, pitch and roll of the head before the camera (docs/reference/conventions.md).
+
+    The same three angles given to `mien render` show the head turned like that.
+    """
+    # The head's x (subject's left), y (up) and z (out of the face) as the camera has them.
+    left, up, out = camera.R_cam_head.T
+    yaw = np.degrees(np.arctan2(left[2], -out[2]))
+    pitch = np.degrees(np.arcsin(np.clip(-up[2], -1, 1)))
+    roll = np.degrees(np.arctan2(-up[0], -up[1]))
+    return float(yaw), float(pitch), float(roll)

@@ -1,4 +1,4 @@
-"""Which names an expression may have: they become files, morph targets, columns and options."""
+"""Names that an expression may have: they become files, morph targets, columns and options."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ _FORBIDDEN = '/\\:*?"<>|'
 
 
 def is_plain_name(name: str) -> bool:
-    """Whether it is one component of a path, on any system, and of an archive member's."""
+    """Whether it can be one component of a path, on any system and in an archive."""
     return bool(
         name and not name.startswith(".") and name.isprintable() and not set(name) & set(_FORBIDDEN)
     )
 
 
 def check_expression_folders(folders: Iterable[Path]) -> None:
-    """Refuse folders whose names cannot be those of expressions.
+    r"""Refuse folders whose names cannot be those of expressions.
 
-    A name is a file's on every system: no control characters, none of / \\ : * ? " < > |, no dot
-    or space at either end, no device of Windows', MAX_NAME_BYTES at most. It is no texture's of the
-    neutral face, and unlike every other one, however letters are written.
+    A name can be a file's on every system: no control characters, none of / \ : * ? " < > |, no dot
+    or space at either end, no device of Windows', MAX_NAME_BYTES at most. It is not a texture's of
+    the neutral face, and differs from every other name in more than case and accents.
 
     Raises:
         InputError: names the folder.
@@ -46,7 +46,7 @@ def check_expression_folders(folders: Iterable[Path]) -> None:
 
 
 def name_problem(name: str) -> str:
-    """What keeps a name from being an expression's; "" where nothing does."""
+    """Why a name cannot be an expression's; "" if it can."""
     odd = [mark for mark in name if mark in _FORBIDDEN or not mark.isprintable()]
     if odd:
         return f"{odd[0]!a} in it"
@@ -60,10 +60,10 @@ def name_problem(name: str) -> str:
 
 
 def _key(name: str) -> str:
-    """Equal for names that some file system takes for one."""
+    """Equal for names that some file systems do not distinguish."""
     return unicodedata.normalize("NFC", name).casefold()
 
 
 def _shown(path: Path) -> str:
-    """Names that are not UTF-8 with what they are escaped."""
+    """The path, bytes that are not UTF-8 escaped."""
     return str(path).encode(errors="surrogateescape").decode(errors="backslashreplace")

@@ -1,4 +1,4 @@
-"""The head that `mien build` makes: what every later stage reads."""
+"""The head that `mien build` makes and every later stage reads."""
 
 from __future__ import annotations
 
@@ -23,16 +23,15 @@ between the lids over neutral's, or that between the lips over the mouth's width
 
 @dataclass(frozen=True)
 class FittedView:
-    """One photo and the camera that was solved for it.
+    """One photo and the camera that was estimated for it.
 
     Attributes:
         photo: the photo's name, relative to the folder that was built, with forward slashes.
         camera: in the pixels of the photo after EXIF orientation.
         rms_px: root mean square reprojection error of the points used.
-        points_used: how many points of this photo the camera and the shape rest on.
-        distrusted: why, by point name, for every point that was seen and not used.
-        gains: (3,) what its colours were multiplied by on the way into the texture, so that photos
-            of different exposure agree.
+        points_used: number of inliers, points of this photo that determine camera and shape.
+        outliers: the reason by point name for every point that was not used.
+        gains: (3,) factors of its colours in the texture, which equalize the photos' exposure.
 
     Raises:
         InputError: an error that is negative or not finite, a negative count.
@@ -42,7 +41,7 @@ class FittedView:
     camera: Camera
     rms_px: float
     points_used: int
-    distrusted: dict[str, str] = field(default_factory=dict)
+    outliers: dict[str, str] = field(default_factory=dict)
     gains: Float[Array, " 3"] = field(default_factory=lambda: np.ones(3))
 
     def __post_init__(self) -> None:
@@ -63,10 +62,10 @@ class Expression:
     Attributes:
         vertices: (V, 3) mm, head space.
         views: the photos it was fitted to.
-        texture: which of the head's textures belongs to it, in the mesh's own coordinates.
-        units: weights of the face units that explain it, as far as they do.
+        texture: name of its texture among the head's, in the mesh's own coordinates.
+        units: weights of the face units that approximate it.
         gaze: (2, 2) radians, yaw to the subject's left and pitch up of the left and the right eye,
-            from where they look in neutral. The vertices have it in them.
+            from neutral's direction. The vertices include it.
     """
 
     vertices: Float[Array, "v 3"]
@@ -92,16 +91,16 @@ class Head:
         subject: the person's name, as the user calls them.
         mesh: the generic topology over the neutral shape; `mesh.vertices` is neutral's.
         expressions: by name; "neutral" is always among them.
-        uncertainty_mm: (V,) expected distance of each vertex of the neutral shape from the truth.
+        uncertainty_mm: (V,) expected error of each vertex of the neutral shape.
         unit_names: the face units this head has (ARKit's 52 names).
         unit_offsets: (K, V, 3) mm, added to the neutral vertices at weight 1.
         textures: (h, w, 3) sRGB by name. "atlas" lies in the mesh's own texture coordinates;
             "cylinder" is [Pighin 2002]'s map (sec. 5.2.1).
-        regions: (V,) in [0, 1], soft masks of the regions of the face that can be controlled by
-            themselves, by name; empty takes the generic head's (rig.regions).
+        regions: (V,) in [0, 1], soft masks of the regions of the face that can be controlled
+            separately, by name; empty takes the generic head's (rig.regions).
         shading: coefficients of the brightness of "eyes" and "teeth" by how far lids and lips are
             open ([Pighin 2002] sec. 5.2.4).
-        left_out: why, by photo name, for every photo that did not fit.
+        left_out: the reason by photo name for every photo that did not fit.
         generator: the program that made it.
 
     Raises:

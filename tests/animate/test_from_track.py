@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mien.animate.from_track import FACING, rest_camera, track_moments, track_timeline
+from mien.animate.from_track import rest_camera, track_moments, track_timeline
 from mien.animate.perform import frame_times, moved_camera
+from mien.camera import FRONTAL
 from mien.errors import InputError
 from mien.numeric.rotation import rotation_from_vector
 from mien.rig.state import FaceState
@@ -28,7 +29,7 @@ def test_the_rest_camera_sees_every_moment_where_the_video_does(rng: np.random.G
 
 
 def test_the_head_at_rest_faces_the_camera_where_it_mostly_was(rng: np.random.Generator) -> None:
-    facing = replace(random_state(rng), R_cam_head=FACING)
+    facing = replace(random_state(rng), R_cam_head=FRONTAL)
     away = replace(facing, t_cam_head=facing.t_cam_head + 300)
     track = track_of([facing, away, facing], rng)
     still, moved, _ = track_moments(track)
@@ -41,7 +42,7 @@ def test_the_head_at_rest_faces_the_camera_where_it_mostly_was(rng: np.random.Ge
 def test_yaw_turns_to_the_subjects_left_and_pitch_down(rng: np.random.Generator) -> None:
     vectors = ((0, 0.3, 0), (0.2, 0, 0), (0, 0, -0.1))
     states = [
-        replace(random_state(rng), R_cam_head=FACING @ rotation_from_vector(np.array(vector)))
+        replace(random_state(rng), R_cam_head=FRONTAL @ rotation_from_vector(np.array(vector)))
         for vector in vectors
     ]
     tracks = track_timeline(track_of(states, rng)).tracks
@@ -86,7 +87,7 @@ def test_lost_frames_are_interpolated(rng: np.random.Generator) -> None:
 def test_a_turn_past_the_back_goes_on(rng: np.random.Generator) -> None:
     angles = np.linspace(2.8, 3.5, 8)
     turns = [
-        replace(random_state(rng), R_cam_head=FACING @ rotation_from_vector(np.array([0, a, 0])))
+        replace(random_state(rng), R_cam_head=FRONTAL @ rotation_from_vector(np.array([0, a, 0])))
         for a in angles
     ]
     yaw = track_timeline(track_of(turns, rng)).tracks["head.yaw"].values

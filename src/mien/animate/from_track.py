@@ -10,14 +10,11 @@ from mien.animate.channels import CHANNEL_NAMES, HEAD, head_angles_rad
 from mien.animate.curves import MIN_STEP, sampled
 from mien.animate.timeline import PIVOT_MM, Moment, Timeline
 from mien.arrays import Array, Float
-from mien.camera import Camera
+from mien.camera import FRONTAL, Camera
 from mien.errors import InputError
 from mien.rig.regions import ENCLOSING_REGIONS
 from mien.rig.state import FACE
 from mien.track.state import GAZE, Layout, Track, TrackedFrame, TrackState
-
-FACING = np.diag([1.0, -1.0, -1.0])
-"""R_cam_head of a head that faces the camera upright."""
 
 
 def rest_camera(track: Track) -> Camera:
@@ -30,7 +27,7 @@ def rest_camera(track: Track) -> Camera:
     """
     positions = [state.t_cam_head for _, state in _found(track)]
     middle = np.median(positions, axis=0)
-    return Camera(track.width, track.height, track.focal_px, FACING, middle)
+    return Camera(track.width, track.height, track.focal_px, FRONTAL, middle)
 
 
 def track_timeline(track: Track) -> Timeline:

@@ -1,4 +1,4 @@
-"""Where the face detector's model lies."""
+"""The file of the face detector's model."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mien.errors import FileFormatError
 
-MODEL_NAME = "face_landmarker.task"
+_MODEL_NAME = "face_landmarker.task"
 
 
 def detector_model_path() -> Path:
@@ -16,7 +16,7 @@ def detector_model_path() -> Path:
     Raises:
         FileFormatError: the installation is incomplete.
     """
-    path = Path(str(files("mien.assets"))) / "data" / MODEL_NAME
+    path = Path(str(files("mien.assets"))) / "data" / _MODEL_NAME
     if not path.is_file():
         raise FileFormatError(path, "expected the face detector's model here; reinstall mien")
     return path

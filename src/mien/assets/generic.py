@@ -17,11 +17,11 @@ from mien.mesh import Mesh
 
 @dataclass(frozen=True)
 class IdentityBasis:
-    """How heads differ from the generic one: vertices = generic + coefficients . components.
+    """Linear model of identity: vertices = generic + coefficients . components.
 
     Attributes:
         components: (K, V, 3) mm, scaled so that a person's coefficients are independent with mean 0
-            and standard deviation 1: the sum of their squares is a prior.
+            and standard deviation 1: half the sum of their squares is the negative log prior.
     """
 
     components: Float[Array, "k v 3"]
@@ -42,20 +42,20 @@ class IdentityBasis:
 
 @dataclass(frozen=True)
 class GenericHead:
-    """The generic head and what is drawn on it.
+    """The generic head with its face units, identity model, regions and landmarks.
 
     Attributes:
         mesh: head space, scaled to an interpupillary distance of 63 mm.
         mirror: (V,) index of each vertex's left-right partner (its own on the midline).
         unit_names: the 52 ARKit names, sorted.
         unit_offsets: (52, V, 3) mm, added to the vertices at weight 1.
-        identity: how heads differ.
+        identity: linear model of other heads.
         regions: soft masks by name, (V,) in [0, 1].
         points: [Pighin 2002]'s 13 points: vertex index by name.
         polylines: vertex indices along each feature curve, by name.
         landmark_triangles: (478,) index of the triangle under each detector landmark.
-        landmark_barycentrics: (478, 3) place in it.
-        landmark_attached: (478,) False where the detector's point has no place on the mesh.
+        landmark_barycentrics: (478, 3) position in it.
+        landmark_attached: (478,) False where the detector's point is not on the mesh.
     """
 
     mesh: Mesh
@@ -99,7 +99,10 @@ class GenericHead:
     def landmark_positions(self, vertices: Float[Array, "v 3"]) -> Float[Array, "478 3"]:
         """The detector's landmarks on a head with these vertices, (V, 3) to (478, 3) mm.
 
-        Rows where landmark_attached is False are a guess. Raises: InputError: wrong shape.
+        Rows where landmark_attached is False are approximate.
+
+        Raises:
+            InputError: wrong shape.
         """
         vertices = check_array("vertices", vertices, self.mesh.vertices.shape)
         corners = vertices[self.mesh.triangles[self.landmark_triangles]]

@@ -64,7 +64,7 @@ class Subregions:
     members: tuple[Int[Array, " m"], ...]
 
     def __post_init__(self) -> None:
-        """Check what a user may have drawn."""
+        """Check values that may come from a user's drawing."""
         count = len(self.names)
         if len(set(self.names)) < count:
             raise InputError("subregions", "names of their own", ", ".join(self.names))
@@ -92,6 +92,7 @@ def default_subregions(
     """The subregions over a person's standard image.
 
     Args:
+        layout: the feature points.
         standard_points: (n, 2) px of the standard image.
         size: its width and height.
         drawing: another one than mien's own.
@@ -222,7 +223,7 @@ def _drawing(document: dict[str, Any], layout: FeatureLayout) -> SubregionDrawin
 def _region(
     entry: dict[str, Any], name: str, before: dict[str, _Region], layout: FeatureLayout
 ) -> _Region:
-    """As drawn, or one of those before it on the other side of the face."""
+    """A region as drawn, or an earlier one mirrored to the other side of the face."""
     if "mirror_of" not in entry:
         also = _points(entry["also"], f"{name}.also", layout) if "also" in entry else []
         group = typed_entry(entry, "group", str, name)

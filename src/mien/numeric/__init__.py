@@ -1,0 +1,1 @@
+"""Linear algebra, solvers, images and rasterization; nothing here knows of faces."""

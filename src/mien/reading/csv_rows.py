@@ -1,4 +1,4 @@
-"""CSV that is read with care: every complaint names line and column."""
+"""CSV, read strictly: every error names line and column."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from mien.reading.files import check_size
 def read_rows(
     path: str | Path, expected: str, *, separators: str = ","
 ) -> Iterator[tuple[int, list[str]]]:
-    """The cells of every line that is not empty, with its number; one at a time, from one on.
+    """The number and the cells of every line that is not empty; lines count from 1.
 
     Args:
+        path: the file.
         expected: what kind of file it should be, for messages.
-        separators: of cells; the one that the first line has most of.
+        separators: of cells; the most frequent one in the first line is used.
 
     Raises:
         InputError: the file cannot be read.
@@ -46,7 +47,7 @@ def read_rows(
 
 
 def _lines(path: Path, stream: TextIO) -> Iterator[str]:
-    """Raises: FileFormatError: one that is too long; a million empty cells take much memory."""
+    """The lines. Raises: FileFormatError: one is too long, as empty cells take much memory."""
     for number, line in enumerate(stream, 1):
         if len(line) > MAX_LINE:
             problem = f"expected lines of at most {MAX_LINE} letters, found {len(line)}"
@@ -58,7 +59,7 @@ def finite_number(path: str | Path, text: str, place: str) -> float:
     """The number in a cell.
 
     Raises:
-        FileFormatError: none, NaN, infinite, beyond any that is meant; names the place.
+        FileFormatError: none, NaN, infinite, larger than LARGEST; names the place.
     """
     value = number_in(text)
     if not math.isfinite(value):
@@ -70,7 +71,7 @@ def finite_number(path: str | Path, text: str, place: str) -> float:
 
 
 def number_in(text: str) -> float:
-    """What a text says, as other programs read it too; NaN for none."""
+    """The number in a text, without Python's own notations; NaN for none."""
     try:
         return math.nan if "_" in text or not text.isascii() else float(text)
     except ValueError:

@@ -1,7 +1,6 @@
-"""Arrays from .npz files, by name: checked before they are unpacked, never cast to something else.
+"""Arrays from .npz files, by name: checked before they are unpacked.
 
-A file's arrays that nobody asks for are never unpacked; the others only where kind, shape and size
-are those expected.
+Only arrays that are asked for are unpacked, and only if type, shape and size are those expected.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from typing import IO, Self
 import numpy as np
 
 from mien.arrays import Array, Float, Int
-from mien.errors import FileFormatError
+from mien.errors import FileFormatError, one_line
 from mien.limits import LARGEST, MAX_ARRAY_BYTES, MAX_ARRAYS, MAX_ARRAYS_BYTES, MIB
 from mien.reading.files import check_size, is_missing
 
@@ -38,8 +37,8 @@ _DAMAGED = (
     NotImplementedError,
     RuntimeError,
 )
-"""What numpy and zipfile raise for changed bytes; the last two for kinds of compression and locks
-that they do not know."""
+"""What numpy and zipfile raise for damaged bytes; the last two for unknown kinds of compression and
+encryption."""
 
 _END = struct.Struct("<4s4H2LH")
 _END_64 = b"PK\x06\x07"
@@ -60,7 +59,7 @@ class ArrayFile:
         """Raises: FileFormatError: missing, not such a file."""
         self.path = Path(path)
         self._taken = 0
-        # A folder or a pipe is damage to the folder that this file belongs to.
+        # Only a missing file is a FileFormatError: check_size has another error for folders.
         if is_missing(self.path):
             raise FileFormatError(self.path, "there is no such file")
         check_size(self.path, 2 * MAX_ARRAYS_BYTES)
@@ -70,7 +69,9 @@ class ArrayFile:
             self._archive = zipfile.ZipFile(self.path)
             names = self._archive.namelist()
         except _DAMAGED as error:
-            raise FileFormatError(self.path, f"not a readable .npz file ({_said(error)})") from None
+            raise FileFormatError(
+                self.path, f"not a readable .npz file ({_summary(error)})"
+            ) from None
         self._names = frozenset(name.removesuffix(".npy") for name in names)
         if len(self._names) < len(names):
             self._archive.close()
@@ -91,7 +92,9 @@ class ArrayFile:
         """Real numbers as float64, finite, from -most to most.
 
         Args:
+            name: of the array.
             shape: one entry an axis; None accepts any length.
+            most: the largest absolute value.
         """
         found = self._read(name, shape, "fiu", "numbers")
         right = (found >= -most) & (found <= most)
@@ -102,7 +105,7 @@ class ArrayFile:
         return found.astype(np.float64, copy=False)
 
     def whole(self, name: str, shape: Shape, *, below: int) -> Int[Array, ...]:
-        """Whole numbers from 0 and below a limit, as int64; of any kind that says them exactly."""
+        """Whole numbers from 0 and below a limit, as int64; of any type that holds them exactly."""
         found = self._read(name, shape, "fiu", "whole numbers")
         # Compared before they are cast, which would wrap or cut them off.
         wrong = ~((found >= 0) & (found < below))
@@ -118,7 +121,7 @@ class ArrayFile:
         try:
             return tuple(self._read(name, (None,), "U", "texts").tolist())
         except ValueError as error:  # What is no character.
-            raise FileFormatError(self.path, _said(error), name) from None
+            raise FileFormatError(self.path, _summary(error), name) from None
 
     def _read(self, name: str, shape: Shape, kinds: str, what: str) -> Array:
         if name not in self._names:
@@ -130,7 +133,7 @@ class ArrayFile:
                 if dtype.hasobject or dtype.kind not in kinds:
                     raise FileFormatError(self.path, f"expected {what}, found {dtype}", name)
                 if not _fits(found, shape):
-                    problem = f"expected shape {_shown(shape)}, found {_shown(found)}"
+                    problem = f"expected shape {_shape_text(shape)}, found {_shape_text(found)}"
                     raise FileFormatError(self.path, problem, name)
                 size = math.prod(found) * dtype.itemsize
                 self._count(name, size, entry.file_size)
@@ -138,7 +141,7 @@ class ArrayFile:
                 if len(data) != size or stream.read(1):
                     raise FileFormatError(self.path, "another length than it states", name)
         except _DAMAGED as error:
-            problem = f"not a readable .npz file ({_said(error)})"
+            problem = f"not a readable .npz file ({_summary(error)})"
             raise FileFormatError(self.path, problem, name) from None
         array: Array = np.frombuffer(data, dtype)
         if dtype.kind == "f" and dtype.itemsize < 4:
@@ -159,8 +162,8 @@ def _check_directory(path: Path, stream: IO[bytes]) -> None:
     """Refuse an archive of so many entries that listing them would take long.
 
     Raises:
-        FileFormatError: bad input.
-        ValueError: bad input.
+        FileFormatError: a single array.
+        ValueError: no archive, too many entries.
     """
     if stream.read(6) == b"\x93NUMPY":
         raise FileFormatError(path, "expected an .npz file, found a single array")
@@ -196,9 +199,9 @@ def _fits(found: tuple[int, ...], shape: Shape) -> bool:
     )
 
 
-def _shown(shape: Shape) -> str:
+def _shape_text(shape: Shape) -> str:
     return f"({', '.join('any' if length is None else str(length) for length in shape)})"
 
 
-def _said(error: BaseException) -> str:
-    return " ".join(str(error).split())[:80] or type(error).__name__
+def _summary(error: BaseException) -> str:
+    return one_line(error)[:80] or type(error).__name__

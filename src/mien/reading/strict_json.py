@@ -1,4 +1,4 @@
-"""JSON that is read with care: every complaint names its place."""
+"""JSON, read strictly: every error names its place in the document."""
 
 from __future__ import annotations
 
@@ -35,11 +35,12 @@ def read_json(path: str | Path) -> dict[str, Any]:
 
 
 def parse_json(path: str | Path, text: str, *, line: int | None = None) -> Any:
-    """What a JSON text says. NaN and infinity pass here; as_number refuses them, where they are.
+    """The value of a JSON text. NaN and infinity pass here; as_number refuses them.
 
     Args:
         path: the file, for messages.
-        line: of the file that the text is, if it is but one of them.
+        text: all of the file, or one line of it.
+        line: its number, if it is one line.
 
     Raises:
         FileFormatError: not JSON; a name that appears twice in one object; too many lists and
@@ -70,11 +71,11 @@ def parse_json(path: str | Path, text: str, *, line: int | None = None) -> Any:
 
 @dataclass(frozen=True)
 class DocumentFormat:
-    """What a document of mien says that it is.
+    """The format that a document of mien states.
 
     Attributes:
-        name: its `format`.
-        version: its `version`: the one that is written, and the newest that can be read.
+        name: the document's `format`.
+        version: its `version` when written, and the newest that can be read.
     """
 
     name: str
@@ -82,7 +83,7 @@ class DocumentFormat:
 
     @property
     def header(self) -> dict[str, Any]:
-        """What a document of this format begins with."""
+        """The first entries of a document of this format."""
         return {"format": self.name, "version": self.version}
 
     def check(self, data: Mapping[str, Any]) -> None:
@@ -106,11 +107,11 @@ class DocumentFormat:
 
 @contextmanager
 def errors_name_file(path: str | Path, line: int | None = None) -> Iterator[None]:
-    """Let what is wrong in a document be an error that names the file that it was read from.
+    """Turn errors in a document into errors that name its file.
 
     Args:
         path: the file.
-        line: of the file that the document is, if it is but one of them.
+        line: its line that holds the document, if it is one line.
 
     Raises:
         FileFormatError: for a DocumentError or an InputError in the block.
@@ -128,26 +129,26 @@ def errors_name_file(path: str | Path, line: int | None = None) -> Iterator[None
 def as_object(value: object, place: str, keys: Iterable[str] | None = None) -> dict[str, Any]:
     """An object with none but these keys. Raises: DocumentError: suggests the nearest keys."""
     if not isinstance(value, dict):
-        complain(place, "an object", value)
+        raise_unexpected(place, "an object", value)
     if keys is not None:
         known = tuple(keys)
         for key in value:
             if key not in known:
-                raise DocumentError(join(place, key), unknown("key", key, known))
+                raise DocumentError(join(place, key), unknown_name("key", key, known))
     return value
 
 
 def as_list(value: object, place: str) -> list[Any]:
     """A list. Raises: DocumentError."""
     if not isinstance(value, list):
-        complain(place, "a list", value)
+        raise_unexpected(place, "a list", value)
     return value
 
 
 def as_text(value: object, place: str) -> str:
     """Text. Raises: DocumentError."""
     if not isinstance(value, str):
-        complain(place, "text", value)
+        raise_unexpected(place, "text", value)
     return value
 
 
@@ -155,7 +156,7 @@ def as_choice(value: object, place: str, kind: str, names: Collection[str]) -> s
     """One of these names. Raises: DocumentError: suggests the nearest ones."""
     name = as_text(value, place)
     if name not in names:
-        raise DocumentError(place, unknown(kind, name, names))
+        raise DocumentError(place, unknown_name(kind, name, names))
     return name
 
 
@@ -169,7 +170,7 @@ def as_number(
 ) -> float:
     """A finite number above one limit or from the other on. Raises: DocumentError."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        complain(place, "a number", value)
+        raise_unexpected(place, "a number", value)
     try:
         number = float(value)
     except OverflowError:
@@ -196,7 +197,7 @@ def as_whole(
 ) -> int:
     """A whole number within these limits. Raises: DocumentError."""
     if isinstance(value, bool) or not isinstance(value, int):
-        complain(place, "a whole number", value)
+        raise_unexpected(place, "a whole number", value)
     as_number(value, place, above=above, least=least, most=most)
     return value
 
@@ -235,8 +236,8 @@ def join(place: str, key: str) -> str:
     return f"{place}.{key}" if place else key
 
 
-def unknown(kind: str, name: str, known: Collection[str]) -> str:
-    """What to say of a name that is none of the known ones."""
+def unknown_name(kind: str, name: str, known: Collection[str]) -> str:
+    """The problem of a name that is none of the known ones, for a message."""
     name = name if len(name) <= 60 else f"{name[:57]}..."
     close = difflib.get_close_matches(name, sorted(known), n=3)
     if close:
@@ -246,15 +247,19 @@ def unknown(kind: str, name: str, known: Collection[str]) -> str:
 
 
 def json_type(value: object) -> str:
-    """What JSON calls a value like this one."""
+    """The JSON type of a value, for messages."""
     if value is None:
         return "null"
     names = {bool: "true or false", dict: "an object", list: "a list", str: "text"}
     return names.get(type(value), "a number")
 
 
-def complain(place: str, expected: str, value: object) -> NoReturn:
-    """Raises: DocumentError: says what kind of value is there instead."""
+def raise_unexpected(place: str, expected: str, value: object) -> NoReturn:
+    """Refuse a value of another type.
+
+    Raises:
+        DocumentError: names the type that was found.
+    """
     shown = f" {str(value)[:40]!r}" if isinstance(value, str) else ""
     raise DocumentError(place, f"expected {expected}, found {json_type(value)}{shown}")
 

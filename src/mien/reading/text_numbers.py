@@ -1,4 +1,4 @@
-"""Text files of nothing but numbers, read with care: every complaint names the line."""
+"""Text files of nothing but numbers, read strictly: every error names the line."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from mien.reading.csv_rows import number_in
 from mien.reading.files import read_text
 
 _MAX_COUNT = 100_000
-"""No file of points means more; a number beyond is no count."""
+"""Files of points hold fewer; a larger number is no count."""
 
 
-class Numbers:
-    """Takes one number after the other from a file.
+class NumberReader:
+    """The numbers of a file, read one after the other.
 
     Args:
+        path: the file.
         expected: what kind of file it should be, for messages.
-        text: of the file, for who has read it.
+        text: of the file, if it is read already.
 
     Raises:
         InputError: the file cannot be read.
@@ -34,11 +35,11 @@ class Numbers:
 
     @property
     def at_end(self) -> bool:
-        """Whether none is left."""
+        """Whether no number is left."""
         return self._next == len(self._words)
 
     def finite(self, what: str) -> float:
-        """The next one. Raises: FileFormatError: none is left, no number, NaN or infinite."""
+        """The next number. Raises: FileFormatError: none is left, no number, NaN or infinite."""
         if self.at_end:
             raise FileFormatError(self._path, f"ends before {what}")
         line, word = self._words[self._next]
@@ -54,7 +55,7 @@ class Numbers:
         return value
 
     def whole(self, what: str, *, least: int = 0, below: int = _MAX_COUNT) -> int:
-        """The next one, whole and within these limits. Raises: FileFormatError."""
+        """The next number, whole and within these limits. Raises: FileFormatError."""
         value = self.finite(what)
         if not (value.is_integer() and least <= value < below):
             line, word = self._words[self._next - 1]
@@ -63,7 +64,7 @@ class Numbers:
         return int(value)
 
     def count(self, what: str) -> int:
-        """The next one, a count of at least one. Raises: FileFormatError."""
+        """The next number, a count of at least one. Raises: FileFormatError."""
         return self.whole(what, least=1)
 
     def expect_end(self) -> None:

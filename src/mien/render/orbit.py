@@ -7,11 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from mien.arrays import Array, Float, check_array, check_positive
-from mien.camera import Camera
+from mien.camera import FRONTAL, Camera
 from mien.errors import InputError
-
-# From head space (x to the subject's left, y up, z out of the face) to a camera before the face.
-_FRONT = np.diag([1.0, -1.0, -1.0])
 
 
 def orbit_camera(
@@ -60,7 +57,7 @@ def orbit_camera(
     focal = max(width, height) / 2 / np.tan(fov / 2)
     free = (0.5 - margin) * np.array([width, height])
     distance = max(float((across * focal / free).max()), 1e-3) + towards
-    rotation = _FRONT @ _turn_head(yaw, pitch)
+    rotation = FRONTAL @ _turn_head(yaw, pitch)
     rotation = _about_z(-roll) @ rotation
     position = np.array([0.0, 0.0, distance]) - rotation @ middle
     return Camera(width, height, float(focal), rotation, position)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mien.arrays import Array, Float, UInt8
-from mien.camera import Camera
+from mien.camera import head_angles_deg
 from mien.head import Head
 from mien.progress import StepProgress, no_step_progress
 from mien.reconstruction.result import Fit, Mark, PhotoFit
@@ -114,16 +114,3 @@ def _residual(mark: Mark) -> dict[str, Any]:
         "trusted": not mark.rejection,
         "verdict": mark.rejection or ("by hand" if mark.by_hand else "detected"),
     }
-
-
-def head_angles_deg(camera: Camera) -> tuple[float, float, float]:
-    """Degrees of yaw, pitch and roll of the head before the camera (docs/reference/conventions.md).
-
-    `mien render` with these angles shows the head in this pose.
-    """
-    # The head's x (subject's left), y (up) and z (out of the face) axes in camera space.
-    left, up, out = camera.R_cam_head.T
-    yaw = np.degrees(np.arctan2(left[2], -out[2]))
-    pitch = np.degrees(np.arcsin(np.clip(-up[2], -1, 1)))
-    roll = np.degrees(np.arctan2(-up[0], -up[1]))
-    return float(yaw), float(pitch), float(roll)

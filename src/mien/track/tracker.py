@@ -15,7 +15,7 @@ from mien.numeric.rotation import rotation_from_vector, rotation_to_vector
 from mien.track.face_model import FaceParameters, TrackedFace
 from mien.track.image.colour_gain import Colours
 from mien.track.image.drawing import Pose
-from mien.track.landmarks.initialization import Found, Starter
+from mien.track.landmarks.initialization import HeadDetection, HeadDetector
 from mien.track.parameters import Belief, Guess
 from mien.track.photometric.frame_fit import FitOptions, Fitted, FrameFit
 from mien.track.photometric.image_jacobian import POSE_UNKNOWNS
@@ -83,7 +83,7 @@ class Tracker:
         height: of the video's upright pictures.
         focal_px: of the video's upright pictures.
         model: of this head and these units, if there are any already; a second each.
-        starter: of this head and these units, if there are any already; a second each.
+        head_detector: of this head and these units, if there are any already; a second each.
 
     Raises:
         InputError: as Rig.
@@ -99,13 +99,15 @@ class Tracker:
         detector: LandmarkDetector,
         options: TrackOptions | None = None,
         model: TrackedFace | None = None,
-        starter: Starter | None = None,
+        head_detector: HeadDetector | None = None,
     ) -> None:
         options = options or TrackOptions()
         self._model = model or TrackedFace(head, units=options.units)
         self._fit = FrameFit(self._model, options.fit)
         self.layout: Layout = self._model.layout
-        self._starter = starter or Starter(head, self.layout, detector, rig=self._model.rig)
+        self._head_detector = head_detector or HeadDetector(
+            head, self.layout, detector, rig=self._model.rig
+        )
         self._camera = Camera(width, height, focal_px, np.eye(3), np.array([0.0, 0.0, 1000.0]))
         self.met_others = False
         self._past: list[TrackedFrame] = []
@@ -124,7 +126,7 @@ class Tracker:
         pixels: UInt8[Array, "h w 3"],
         frame: int,
         time: float,
-        start: Found | None = None,
+        start: HeadDetection | None = None,
     ) -> TrackedFrame:
         """What the next frame shows.
 
@@ -175,7 +177,7 @@ class Tracker:
         Units move one texture about: of a mouth that was never photographed open, the picture says
         too little.
         """
-        state = self._starter.find_at(pixels, guess.pose.t, focal_px=camera.focal_px)
+        state = self._head_detector.detect_near(pixels, guess.pose.t, focal_px=camera.focal_px)
         return guess if state is None else replace(guess, face=self._guess(state).face)
 
     def _steadied(self, fitted: Fitted) -> Fitted:
@@ -190,26 +192,28 @@ class Tracker:
         return replace(fitted, guess=start.moved(taken))
 
     def _found(
-        self, pixels: Array, camera: Camera, *, closely: bool, start: Found | None = None
+        self, pixels: Array, camera: Camera, *, closely: bool, start: HeadDetection | None = None
     ) -> Fitted | None:
         """By the detector, the face most like the head; None where there is none, or another's."""
         if start is not None:
             return self._likest([start], pixels, camera)
-        starts = self._starter.find(pixels, focal_px=camera.focal_px)
+        starts = self._head_detector.detect(pixels, focal_px=camera.focal_px)
         best = self._likest(starts, pixels, camera)
         if best is None and closely:
-            small = self._starter.find(pixels, focal_px=camera.focal_px, small=True)
+            small = self._head_detector.detect(pixels, focal_px=camera.focal_px, small=True)
             best, starts = self._likest(small, pixels, camera), [*starts, *small]
         self.met_others |= bool(starts) and best is None
         return best
 
-    def resembles(self, pixels: UInt8[Array, "h w 3"], found: Found) -> bool:
+    def resembles(self, pixels: UInt8[Array, "h w 3"], found: HeadDetection) -> bool:
         """Whether the head looks like a picture, its own size or smaller, in the place found."""
         return self._likest([found], pixels, self._camera_of(pixels)) is not None
 
-    def _likest(self, starts: Sequence[Found], pixels: Array, camera: Camera) -> Fitted | None:
+    def _likest(
+        self, starts: Sequence[HeadDetection], pixels: Array, camera: Camera
+    ) -> Fitted | None:
         """From the start that gives the face most like the head; None where none is like it."""
-        fits = [(self._fitted_anew(one.state, pixels, camera), one.misfit_mm) for one in starts]
+        fits = [(self._fitted_anew(one.state, pixels, camera), one.rms_mm) for one in starts]
         sound = [(fit, _unlike(fit, misfit)) for fit, misfit in fits if _if_like(fit)]
         best, _ = min(sound, key=lambda pair: pair[1], default=(None, 0.0))
         return best if best and best.agreement.rms <= self._most_usual else None

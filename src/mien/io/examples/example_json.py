@@ -19,7 +19,7 @@ from mien.reading.strict_json import (
     as_text,
     join,
     need,
-    unknown,
+    unknown_name,
 )
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
@@ -106,7 +106,7 @@ def points_from_json(
 def index_of(name: object, place: str, names: list[str]) -> int:
     """Index of the example of a name. Raises: DocumentError: none; suggests the nearest."""
     if as_text(name, place) not in names:
-        raise DocumentError(place, unknown("example", str(name), names))
+        raise DocumentError(place, unknown_name("example", str(name), names))
     return names.index(str(name))
 
 

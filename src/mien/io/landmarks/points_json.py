@@ -21,7 +21,7 @@ from mien.reading.strict_json import (
     join,
     need,
     read_json,
-    unknown,
+    unknown_name,
 )
 
 __all__ = ["load_points_json", "save_points_json"]
@@ -92,7 +92,7 @@ def _points(
 def _point(name: str, row: object, layout: FeatureLayout, axes: int) -> Float[Array, " d"]:
     place = join("points", name)
     if name not in layout.names:
-        raise DocumentError(place, unknown("point", name, layout.names))
+        raise DocumentError(place, unknown_name("point", name, layout.names))
     numbers = as_list(row, place)
     if len(numbers) != axes:
         expected = "x and y" if axes == 2 else "x, y and z"

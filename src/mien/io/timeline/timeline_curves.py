@@ -10,7 +10,14 @@ import numpy as np
 
 from mien.animate.curves import INTERPOLATIONS, MIN_STEP, Curve, constant
 from mien.errors import DocumentError
-from mien.reading.strict_json import as_choice, as_list, as_number, as_object, complain, need
+from mien.reading.strict_json import (
+    as_choice,
+    as_list,
+    as_number,
+    as_object,
+    need,
+    raise_unexpected,
+)
 
 _KEY = ("time", "value", "interpolation", "in", "out")
 
@@ -24,7 +31,7 @@ def curve_from_json(value: object, place: str) -> Curve:
     if isinstance(value, int | float):
         return constant(as_number(value, place))
     if not isinstance(value, list | dict):
-        complain(place, "a number, a list of keys or an object", value)
+        raise_unexpected(place, "a number, a list of keys or an object", value)
     if isinstance(value, list):
         value = {"keys": value}
     data = as_object(value, place, ("interpolation", "keys"))

@@ -8,7 +8,7 @@ from pathlib import Path
 from mien.animate.channels import CHANNEL_NAMES, REGION_NAMES, UNITS, split_channel
 from mien.animate.timeline import Timeline, Tracks
 from mien.errors import FileFormatError, InputError
-from mien.reading.strict_json import unknown
+from mien.reading.strict_json import unknown_name
 
 
 def load_timeline(path: str | Path) -> Timeline:
@@ -63,10 +63,10 @@ def check_timeline(
         if group in CHANNEL_NAMES:
             continue
         if group != UNITS and group not in regions:
-            raise FileFormatError(path, unknown("region", group, regions), place)
+            raise FileFormatError(path, unknown_name("region", group, regions), place)
         known, kind = (units, "unit") if group == UNITS else (expressions, "expression")
         if name not in known:
-            raise FileFormatError(path, unknown(kind, name, known), place)
+            raise FileFormatError(path, unknown_name(kind, name, known), place)
 
 
 def _load_table(path: str | Path) -> Timeline:

@@ -20,8 +20,8 @@ def fill_pyramid(
     """Holes filled smoothly, by averages over ever larger surroundings: (H, W, C) float32.
 
     Args:
-        image: (H, W, C); what is under weight zero has no influence.
-        weights: (H, W) in [0, 1]: how far a pixel is known. In between, the result is the blend.
+        image: (H, W, C); pixels of weight zero have no influence.
+        weights: (H, W) in [0, 1]: confidence of each pixel. In between, the result is a blend.
         wrap: left and right ends touch.
 
     Raises:
@@ -46,9 +46,9 @@ def fill_pyramid(
 def fill_growing(
     image: Float[Array, "h w c"], known: Bool[Array, "h w"], *, wrap: bool = False
 ) -> Float[Array, "h w c"]:
-    """Holes filled by growing the known area a pixel at a time, each new one the mean of its known
+    """Holes filled by growing the known area a pixel at a time: (H, W, C) float32.
 
-    neighbours (of eight): (H, W, C) float32.
+    Each new pixel is the mean of its known neighbours, of eight.
 
     Args:
         image: (H, W, C).

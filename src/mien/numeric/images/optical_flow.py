@@ -1,4 +1,4 @@
-"""Dense matching of two images that are nearly alike: local contrast, optical flow, correlation."""
+"""Dense optical flow between two similar images, local contrast and local correlation."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mien.arrays import Array, Bool, Float
 _NOISE_FLOOR = 3.0
 """Grey levels (of 255): contrast below this is noise and is not amplified."""
 _CONTRAST = 45.0
-"""Grey levels that one local standard deviation becomes in the 8-bit image that is matched."""
+"""Grey levels of one local standard deviation in the 8-bit image that is matched."""
 _CORRELATION_PX = 2.5
 
 
@@ -20,12 +20,13 @@ def normalize_contrast(
 ) -> Float[Array, "h w"]:
     """The image less its local mean, over its local deviation; 0 outside of the mask.
 
-    Takes out exposure, white balance and shading, all of which vary slowly. Only pixels within
-    the mask count for the statistics, so that a background does not darken what is before it.
+    It removes exposure, white balance and shading, which vary slowly. The statistics are of pixels
+    within the mask only, so that the background has no influence.
 
     Args:
         image: (H, W) from 0 to 255.
-        radius_px: about the size of what is kept.
+        mask: (H, W) pixels that count.
+        radius_px: about the size of the details that are kept.
     """
     import cv2
 
@@ -49,22 +50,24 @@ def normalize_contrast(
 def optical_flow(
     a: Float[Array, "h w"], b: Float[Array, "h w"], *, fine: bool = False
 ) -> Float[Array, "h w 2"]:
-    """(H, W, 2) px: where each pixel of a is found in b, less its own place.
-
-    Both are of local contrast (`normalize_contrast`). Dense inverse search flow (Kroeger et al.,
-    Fast Optical Flow using Dense Inverse Search, 2016) down to single pixels.
+    """(H, W, 2) px: the displacement from each pixel of a to its match in b.
 
     Args:
-        fine: of waves 18 px long half the height is found instead of a quarter, at twice the noise:
-            for those who average.
+        a: (H, W) local contrast (`normalize_contrast`).
+        b: (H, W) likewise.
+        fine: recover half the height of waves 18 px long instead of a quarter, at twice the noise:
+            for flows that are averaged afterwards.
+
+    Source:
+        Kroeger et al., Fast Optical Flow using Dense Inverse Search, 2016; down to single pixels.
     """
-    return _searcher(fine).calc(_eight_bit(a), _eight_bit(b), None)
+    return _matcher(fine).calc(_eight_bit(a), _eight_bit(b), None)
 
 
 def local_correlation(
     a: Float[Array, "h w"], b: Float[Array, "h w"], radius_px: float = _CORRELATION_PX
 ) -> Float[Array, "h w"]:
-    """(H, W) from -1 to 1: how alike the surroundings of each pixel are."""
+    """(H, W) from -1 to 1: normalized cross-correlation of the windows around each pixel."""
     import cv2
 
     side = 2 * round(2 * radius_px) + 1
@@ -82,19 +85,19 @@ def _eight_bit(image: Array) -> Array:
     return np.clip(128 + _CONTRAST * image, 0, 255).astype(np.uint8)
 
 
-def _searcher(fine: bool) -> Any:
-    """Not kept: it is not safe in two threads at once.
+def _matcher(fine: bool) -> Any:
+    """The matcher; a new one each time, as it is not safe in two threads at once.
 
     On rendered pairs with exact truth these settings are as near to it as the preset's, in less
     than half the time (docs/method/registration.md).
     """
     import cv2
 
-    searcher = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-    searcher.setFinestScale(0)
-    searcher.setPatchStride(5)
-    searcher.setGradientDescentIterations(12)
-    searcher.setVariationalRefinementIterations(5 if fine else 2)
+    matcher = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    matcher.setFinestScale(0)
+    matcher.setPatchStride(5)
+    matcher.setGradientDescentIterations(12)
+    matcher.setVariationalRefinementIterations(5 if fine else 2)
     # How smooth the flow is to be; the preset has 20.
-    searcher.setVariationalRefinementAlpha(5.0 if fine else 20.0)
-    return searcher
+    matcher.setVariationalRefinementAlpha(5.0 if fine else 20.0)
+    return matcher

@@ -1,4 +1,4 @@
-"""Images read between their pixels. Pixel (column, row) has its centre at (+0.5, +0.5)."""
+"""Bilinear sampling of images. Pixel (column, row) has its centre at (+0.5, +0.5)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from mien.numeric.kernels.threads import for_row_bands
 
 
 def sample_bilinear(image: Array, xy: Float[Array, "n 2"]) -> Float[Array, "n c"]:
-    """Colours at places of an image, (N, C) float32 in the image's own units.
+    """Colours at positions in an image, (N, C) float32 in the image's own units.
+
+    OpenCV's remap is about as fast but rounds positions to 1/32 px, which shows in derivatives.
 
     Args:
         image: (H, W, C) uint8 or float32.
@@ -19,8 +21,6 @@ def sample_bilinear(image: Array, xy: Float[Array, "n 2"]) -> Float[Array, "n c"
 
     Raises:
         InputError: shapes, an empty image, NaN.
-
-    OpenCV's remap is about as fast but rounds places to 1/32 px, which shows in derivatives.
     """
     if image.ndim != 3 or image.size == 0:
         raise InputError("image", "an (h, w, c) image", f"shape {image.shape}")
@@ -28,9 +28,9 @@ def sample_bilinear(image: Array, xy: Float[Array, "n 2"]) -> Float[Array, "n c"
     pixels = frozen(
         np.ascontiguousarray(image, np.uint8 if image.dtype == np.uint8 else np.float32)
     )
-    places = frozen(np.ascontiguousarray(xy))
+    positions = frozen(np.ascontiguousarray(xy))
     out = np.empty((len(xy), image.shape[2]), np.float32)
-    for_row_bands(lambda a, b: _sample_rows(pixels, places, a, b, out), len(xy), work=len(xy))
+    for_row_bands(lambda a, b: _sample_rows(pixels, positions, a, b, out), len(xy), work=len(xy))
     return out
 
 
@@ -38,7 +38,7 @@ def sample_bilinear(image: Array, xy: Float[Array, "n 2"]) -> Float[Array, "n c"
 def bilinear_neighbours(
     x: float, y: float, width: int, height: int
 ) -> tuple[int, int, int, int, float, float]:
-    """The four pixels around a place and how far it is between them: (x0, x1, y0, y1, fx, fy)."""
+    """The four pixels around a position and the fractions between them: x0, x1, y0, y1, fx, fy."""
     x = min(max(x - 0.5, 0.0), width - 1.0)
     y = min(max(y - 0.5, 0.0), height - 1.0)
     x0, y0 = int(x), int(y)

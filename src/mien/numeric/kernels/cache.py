@@ -1,7 +1,7 @@
-"""Where compiled kernels are kept between runs, and files of them that no crash can spoil.
+"""The cache of compiled kernels between runs: its folders, and files that survive crashes.
 
-Numba's own cache wants a folder that can be written, trusts every byte that it finds there, and
-lets two processes that compile the same kernel for different types write to one file.
+Numba's own cache needs a writable folder, trusts every byte in it, and lets two processes that
+compile the same kernel for different types write to one file.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from pathlib import Path
 from typing import Any
 
 PACKAGE = Path(__file__).resolve().parents[2]
-_SEAL_BYTES = hashlib.sha256().digest_size
+_DIGEST_BYTES = hashlib.sha256().digest_size
 _STALE_SECONDS = 3600.0  # no process is still writing a file of that age
 
 
 @cache
 def kernel_folders() -> tuple[Path, ...]:
-    """Folders to read compiled kernels from; the first is written to. None: nothing can be kept.
+    """Folders to read compiled kernels from; the first is written to; () where none can be.
 
     In order: NUMBA_CACHE_DIR, the package's own __pycache__, the user's folder for caches, a
-    private one among temporary files. A package that cannot be written to is still read: whoever
-    installed it may have run it once.
+    private one among temporary files. A package that cannot be written to is still read: its
+    installer may have run it once.
     """
     own = PACKAGE / "__pycache__"
     passed: tuple[Path, ...] = ()
@@ -48,7 +48,7 @@ def kernel_folders() -> tuple[Path, ...]:
 
 
 def kernels_are_kept() -> bool:
-    """Whether an earlier run left compiled kernels."""
+    """Whether there are compiled kernels of an earlier run."""
     return any(next(folder.glob("*.nbi"), None) is not None for folder in kernel_folders()[:2])
 
 
@@ -69,7 +69,7 @@ def _users_own() -> Path | None:
 
 
 def _temporary() -> Path | None:
-    """Code is loaded from here: nobody else may have made it or be able to write to it."""
+    """A folder of the user's alone: code is loaded from it, so nobody else may write to it."""
     if sys.platform == "win32":
         return Path(tempfile.gettempdir()) / _name()  # within the user's own folders
     folder = Path(tempfile.gettempdir()) / f"{_name()}-{os.getuid()}"
@@ -80,7 +80,7 @@ def _temporary() -> Path | None:
 
 
 def _name() -> str:
-    """Installations of different versions side by side do not get into each other's way."""
+    """A folder name of this installation, so that others do not share it."""
     return f"mien-{hashlib.sha256(os.fsencode(PACKAGE)).hexdigest()[:16]}"
 
 
@@ -88,14 +88,14 @@ def _name() -> str:
 class KernelFiles:
     """The machine code of one kernel: an index of signatures, and a file for each.
 
-    Each file begins with a seal over its name, the kernel's source and the rest of the file. What
-    is damaged, of an earlier source or of another version is deleted and counts as not there.
+    Each file begins with a digest of its name, the kernel's source and the rest of the file. Files
+    that are damaged, of an earlier source or of another version are deleted and count as missing.
 
     Attributes:
-        folder: where they lie.
-        base: what their names begin with, the kernel's own.
-        stamp: differs where the source or a version does.
-        dump: makes bytes that pickle can load.
+        folder: that holds them.
+        base: the beginning of their names, the kernel's own.
+        stamp: changes with the source and with versions.
+        dump: serializes for pickle.
     """
 
     folder: Path
@@ -104,21 +104,21 @@ class KernelFiles:
     dump: Callable[[Any], bytes]
 
     def load(self, key: Any) -> Any:
-        """What was saved for this key, or None."""
+        """The data saved for this key, or None."""
         name = self._load_index().get(key)
         return None if name is None else self._read(self.folder / name)
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep data, which is not None. Raises: OSError."""
+        """Save data, which is not None. Raises: OSError."""
         # A name of its own: two processes may be doing this at once.
         name = f"{self.base}.{uuid.uuid4().hex[:16]}.nbc"
         self._write(self.folder / name, data)
         self._write(self._index, {**self._load_index(), key: name})
-        for path in self._left_behind():
+        for path in self._stale_files():
             path.unlink(missing_ok=True)
 
     def clear(self) -> None:
-        """Forget everything. Raises: OSError."""
+        """Delete everything. Raises: OSError."""
         self._write(self._index, {})
 
     @property
@@ -128,7 +128,7 @@ class KernelFiles:
     def _load_index(self) -> dict[Any, str]:
         return self._read(self._index) or {}
 
-    def _left_behind(self) -> Iterator[Path]:
+    def _stale_files(self) -> Iterator[Path]:
         """Files of processes that died, and those that no index names any more."""
         used = {self._index.name, *self._load_index().values()}
         for path in self.folder.glob(f"{self.base}.*"):
@@ -140,8 +140,8 @@ class KernelFiles:
             content = path.read_bytes()
         except OSError:
             return None
-        seal, rest = content[:_SEAL_BYTES], content[_SEAL_BYTES:]
-        if seal == self._seal(path, rest):
+        digest, rest = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+        if digest == self._digest(path, rest):
             return pickle.loads(rest)
         with suppress(OSError):
             path.unlink()
@@ -151,10 +151,10 @@ class KernelFiles:
         rest = self.dump(data)
         temporary = path.with_name(f"{path.name}.{uuid.uuid4().hex[:16]}.tmp")
         try:
-            temporary.write_bytes(self._seal(path, rest) + rest)
+            temporary.write_bytes(self._digest(path, rest) + rest)
             os.replace(temporary, path)
         finally:
             temporary.unlink(missing_ok=True)
 
-    def _seal(self, path: Path, rest: bytes) -> bytes:
+    def _digest(self, path: Path, rest: bytes) -> bytes:
         return hashlib.sha256(b"\0".join((self.stamp, path.name.encode(), rest))).digest()

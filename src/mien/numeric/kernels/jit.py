@@ -25,8 +25,8 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable], Any]:
     """Compile a function of a module, without Python objects.
 
     Args:
-        cache: keep the machine code for later runs, where there is a place for it. Unlike Numba's,
-            it notices when a kernel of another module that this one calls has changed.
+        cache: keep the machine code for later runs, where a folder can be written. Unlike Numba's,
+            it notices a change in a kernel of another module that this one calls.
         options: as numba.njit takes them.
     """
 
@@ -41,13 +41,14 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable], Any]:
 
 
 class _KernelCache:
-    """Stands in for numba.core.caching.FunctionCache: the methods that a dispatcher calls."""
+    """Replaces numba.core.caching.FunctionCache: the methods that a dispatcher calls."""
 
     def __init__(self, function: FunctionType) -> None:
         self._function = function
 
     @property
     def cache_path(self) -> str | None:
+        """The folder that is written to."""
         return str(self._places[0].folder) if self._places else None
 
     def load_overload(self, signature: Any, context: Any) -> Any:
@@ -61,7 +62,7 @@ class _KernelCache:
         return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
-        """Keep it for later; where that fails, they compile it anew."""
+        """Save the kernel; where that fails, a later run compiles it anew."""
         # Addresses within this process mean nothing to another.
         if result.lifted or result.library.has_dynamic_globals:
             return
@@ -70,6 +71,7 @@ class _KernelCache:
                 files.save((signature, result.codegen.magic_tuple()), result._reduce())
 
     def flush(self) -> None:
+        """Delete what is saved."""
         with suppress(OSError):
             for files in self._places[:1]:
                 files.clear()
@@ -84,7 +86,7 @@ class _KernelCache:
 
 
 def _stamp(function: FunctionType) -> bytes:
-    """Differs where anything does that the function's machine code depends on."""
+    """A digest of everything that the function's machine code depends on."""
     found = hashlib.sha256(f"{sys.version} {numba.__version__} {llvmlite.__version__}".encode())
     for piece in _ingredients(function, set()):
         found.update(hashlib.sha256(piece).digest())

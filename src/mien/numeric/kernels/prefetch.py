@@ -1,4 +1,4 @@
-"""Memory asked for before it is needed."""
+"""Prefetching of memory in kernels."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ __all__ = ["prefetch"]
 def prefetch(_: Any, array: Any, index: Any) -> Any:
     """Within a kernel: have the processor fetch a 1-D array's element; it need not exist.
 
-    Where what is looked up next lies in many short stretches, far from each other, the processor
-    does not foresee it, and waits.
+    The processor does not predict reads of many short runs that lie far from each other, and
+    waits for them.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

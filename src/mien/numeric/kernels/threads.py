@@ -1,4 +1,4 @@
-"""Work shared by threads; the result never depends on how many.
+"""Threads for kernels and tasks; results do not depend on their number.
 
 Kernels are Numba functions compiled with `nogil`, called on bands of an image's rows from a pool of
 Python threads. Numba's own `parallel=True` takes longer to compile, and its default threading
@@ -16,8 +16,8 @@ import numba
 
 _Result = TypeVar("_Result")
 
-# Pixels of some 10 ns each. Waking a second thread and hearing from it takes 0.05 ms of either's
-# time: of less work than this, what it would save is not worth what it costs other tasks.
+# Pixels of some 10 ns each. Waking a second thread and waiting for it takes 0.05 ms of either's
+# time: with less work than this it does not pay.
 _SERIAL_WORK = 30_000
 
 
@@ -31,26 +31,26 @@ def for_row_bands(kernel: Callable[[int, int], object], rows: int, *, work: int)
 
     Args:
         kernel: releases the GIL, and writes to its own rows only.
-        rows: how many there are.
-        work: about how many pixels it costs, to decide whether threads are worth waking.
+        rows: their number.
+        work: estimated cost in pixels, which decides whether threads are used.
     """
     threads = int(numba.get_num_threads()) if work >= _SERIAL_WORK else 1
     if threads == 1:
         kernel(0, rows)
         return
-    # More bands than threads: an image's busy rows are seldom spread evenly. Of little work, each
-    # band more would cost what it evens out.
+    # More bands than threads balance the load, as costly rows are seldom spread evenly; with
+    # little work they cost more than they save.
     bands = min(rows, threads * (4 if work > 20 * _SERIAL_WORK else 1))
     edges = [rows * band // bands for band in range(bands + 1)]
     tasks = [_pool(threads).submit(kernel, *edges[band : band + 2]) for band in range(1, bands)]
-    # This thread would only wait.
+    # This thread would be idle.
     kernel(*edges[:2])
     for task in tasks:
         task.result()
 
 
 def run_concurrently(*tasks: Callable[[], _Result]) -> list[_Result]:
-    """What each task returns; they run at once, in as many threads as Numba uses.
+    """The results of tasks that run at once, in as many threads as Numba uses.
 
     Args:
         tasks: release the GIL most of the time, share nothing that they change, and do not call

@@ -197,8 +197,13 @@ def _clip_columns(
     """Of the columns from left to right, the first and the last inside an edge.
 
     Args:
+        a: slope of the edge's function a (x - x0) + rest along the row.
+        x0: as there.
+        rest: as there.
         least: of the values inside (edge_line).
         shift: rest / a; the edge crosses the row at x0 - shift.
+        left: first column.
+        right: last column.
     """
     if a == 0.0:
         return (left, right) if rest >= least else (left, left - 1)

@@ -175,7 +175,7 @@ def _placed(
     shades = np.empty((count, 2 + textures), np.float32)
     seen = (face.vertices, face.brightness, face.weights)
     _place_vertices(*seen, motion, lens, places, points, depth, shades)
-    # As sharp as a picture of four samples a pixel (render.mix).
+    # As sharp as a picture of four samples a pixel (render.multitexture).
     shades[:, 0] = level_of_detail(painted.texels, points, painted.triangles) - 0.5
     surface = _Surface(compared, painted.triangles, painted.uvs, shades)
     return _Placed(surface, places, frozen(points), frozen(depth), empty_raster(*view.size))
