@@ -55,12 +55,16 @@ class DrawnHead:
 def draw_tracked_head(
     renderer: HeadRenderer, track: Track, frame: TrackedFrame, camera: Camera | None = None
 ) -> DrawnHead | None:
-    """The head drawn as it was tracked in a frame.
+    """The head drawn as it was tracked in a frame; None where it was lost.
 
-    Attributes:
-        picture: (h, w, 4) sRGB with straight alpha, in the frame's own colours.
-        mask: (h, w) where it shows the face: face_mask without the pixels of its outline, which
-            are not fully covered.
+    Args:
+        renderer: of the head.
+        track: that the frame is of.
+        frame: of the track.
+        camera: of a part of the frame or of another size; by default the track's own.
+
+    Raises:
+        InputError: an expression or unit that the head does not have.
     """
     if frame.state is None:
         return None
@@ -126,12 +130,12 @@ def _feathered(mask: Bool[Array, "h w"]) -> Float[Array, "h w"]:
     """(h, w) float32: 0 at the mask's border and outside, 1 a little further in."""
     import cv2
 
-    mask = mask.astype(np.float32)
-    sigma = max(0.5, _BORDER * float(np.sqrt(mask.sum())))
+    weight = mask.astype(np.float32)
+    sigma = max(0.5, _BORDER * float(np.sqrt(weight.sum())))
     across = 2 * round(sigma) + 1
     for _ in range(2):
-        mask = cv2.blur(mask, (across, across))
-    return np.clip(2 * mask - 1, 0, 1) * mask
+        weight = cv2.blur(weight, (across, across))
+    return np.clip(2 * weight - 1, 0, 1) * mask
 
 
 def _check_size(name: str, image: object, mask: Bool[Array, "h w"]) -> UInt8[Array, "h w 3"]:
