@@ -1,8 +1,8 @@
 """What the documentation's site has beyond docs/: the public names, measured tables, citations.
 
 mkdocs calls the functions named `on_...` (`hooks` in mkdocs.yml). Each public name gets a page made
-of its docstring. The pages of benchmarks/ become pages of the site, so that links to them work there
-as well as where the repository is browsed. `[Pighin 2002]` and `[Zhang 2006]` become links, also in
+of its docstring. The pages of benchmarks/ become pages of the site, so links to them work there as
+well as where the repository is browsed. `[Pighin 2002]` and `[Zhang 2006]` become links, also in
 docstrings.
 """
 
