@@ -91,8 +91,8 @@ def register_views(
         cameras: from landmarks, within some 15 degrees.
         vertices: from landmarks, within some 15 degrees.
         features: landmarks and marks of the same photos. Landmarks determine which point of the
-            mesh is which, and lead the camera of a photo that shares too little with the others; marks lead
-            all cameras, and the head passes through them in the end.
+            mesh is which, and lead the camera of a photo that shares too little with the others;
+            marks lead all cameras, and the head passes through them in the end.
         focal: which photos share a focal length, and their priors.
         generic: the generic head.
         scales: mm a px, from round to round.
