@@ -1,4 +1,4 @@
-"""Measures the figures of docs/method/face-units.md: python -m tools.measure_units HEAD.
+"""Measures the figures of docs/notes/face-units.md: python -m tools.measure_units HEAD.
 
 HEAD is a head folder, made by `mien build`; without one the generic head is measured. Depths are
 in mm: of lids in the eyeballs, of one lip in the other, both beyond what they are when the face is

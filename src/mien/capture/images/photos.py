@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mien.arrays import Array, UInt8, check_image, check_positive, frozen
+from mien.capture.images.colour import convert_to_srgb, to_eight_bits, tone_map_hdr
 from mien.capture.images.exif import focal_prior_px, orientation
+from mien.capture.images.jpeg2000 import eight_bits_if_deep
 from mien.capture.images.opening import open_image
 from mien.reading.names import check_path, portable_name
 
@@ -123,9 +125,6 @@ def _shrunk_rgb(image: Image, max_side: int, notes: list[str]) -> Image:
     picture is then held only once.
     """
     from PIL import Image
-
-    from mien.capture.images.colour import convert_to_srgb, to_eight_bits, tone_map_hdr
-    from mien.capture.images.jpeg2000 import eight_bits_if_deep
 
     factor = min(1.0, max_side / max(image.size))
     target = max(1, round(image.width * factor)), max(1, round(image.height * factor))

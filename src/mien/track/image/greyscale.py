@@ -12,7 +12,7 @@ from mien.render.mipmap import UNIT, Four, Pyramids
 
 LUMA = (0.299, 0.587, 0.114)
 """Of red, green and blue (BT.601): faces are compared in shades of grey, which tells as much about
-them as their colours do at a third of the cost (docs/notes/tracking.md)."""
+them as their colours do at a third of the cost (docs/notes/tracking-experiments.md)."""
 STEPS = 256
 _FINEST = 1024
 """Px of a texture's side: a face is compared too small for finer ones to be looked at."""

@@ -2,7 +2,7 @@
 
 Nothing that is drawn is left out: what hides what, what a filter makes of a moving outline, and, if
 asked for, contacts and shadows. It takes two more drawings for every unknown, where the analytic
-way takes none (docs/notes/tracking.md compares them).
+way takes none (docs/notes/tracking-experiments.md compares them).
 """
 
 from __future__ import annotations
