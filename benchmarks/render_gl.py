@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.render_scene import Scene, arguments, build_scene, measure
+from benchmarks.render_scene import RenderScene, arguments, build_scene, measure
 from mien.arrays import Array
 from mien.rig.state import PosedFace
 
@@ -77,7 +77,7 @@ class PassRenderer:
     straight alpha of 8 bits on the GPU's side, and is read back as such.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: RenderScene) -> None:
         import moderngl
 
         self.gl: Any = moderngl

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mien.animate.from_track import rest_camera, track_moments, track_timeline
-from mien.animate.perform import frames_of, moved_camera
+from mien.animate.perform import frame_times, moved_camera
 from mien.camera import FRONTAL
 from mien.errors import InputError
 from mien.numeric.rotation import rotation_from_vector
@@ -72,11 +72,11 @@ def test_times_count_from_the_first_frame_and_fill_the_video(rng: np.random.Gene
     timeline = track_timeline(track)
     times = [moment.time for moment in track_moments(track)]
     np.testing.assert_allclose(times, np.arange(9) / 25, atol=1e-12)
-    np.testing.assert_allclose(frames_of(timeline), times, atol=1e-12)
+    np.testing.assert_allclose(frame_times(timeline), times, atol=1e-12)
     assert timeline.fps == 25
 
 
-def test_lost_frames_are_bridged_by_their_neighbours(rng: np.random.Generator) -> None:
+def test_lost_frames_are_interpolated(rng: np.random.Generator) -> None:
     first, last = random_state(rng), random_state(rng)
     track = track_of([None, first, None, None, last, None], rng)
     jaw = [moment.state.units["jawOpen"] for moment in track_moments(track)]
@@ -102,10 +102,10 @@ def test_frames_of_one_time_show_the_first(rng: np.random.Generator) -> None:
     assert curve.values.tolist() == [states[0].units[0], states[2].units[0]]
 
 
-def test_one_frame_is_a_performance(rng: np.random.Generator) -> None:
+def test_a_track_of_one_frame(rng: np.random.Generator) -> None:
     timeline = track_timeline(track_of([random_state(rng)], rng))
     assert timeline.duration == pytest.approx(1 / 25)
-    assert len(frames_of(timeline)) == 1
+    assert len(frame_times(timeline)) == 1
 
 
 def test_a_track_without_a_face_is_refused(rng: np.random.Generator) -> None:

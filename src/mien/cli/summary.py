@@ -1,4 +1,4 @@
-"""What a build says when it is done."""
+"""Summary of a finished build."""
 
 from __future__ import annotations
 

@@ -22,15 +22,15 @@ def orbit_camera(
     fov: float = np.radians(18),
     margin: float = 0.06,
 ) -> Camera:
-    """A camera that sees all the vertices, the middle of the box around them in its own middle.
+    """A camera that sees all vertices, with the middle of their bounding box in its centre.
 
     Args:
         yaw: radians; positive sees more of the subject's left side.
         pitch: radians; positive looks down from above.
-        roll: radians; positive turns the camera so that the head seems to turn counter-clockwise.
+        roll: radians; positive turns the head counter-clockwise in the picture.
         width: px.
         height: px.
-        vertices: (V, 3) mm; the same for all cameras of a turn, so that the head keeps its size.
+        vertices: (V, 3) mm; the same for all cameras of an orbit, so that the scale is constant.
         fov: radians over the image's longer side; the default is a portrait lens.
         margin: share of the image that stays free on every side.
 
@@ -72,7 +72,15 @@ def turntable(
     pitch: float = 0.0,
     fov: float = np.radians(18),
 ) -> Iterator[Camera]:
-    """Cameras once around the head, starting in front; the last frame leads back to the first.
+    """Cameras once around the head, starting in front, as a loop.
+
+    Args:
+        frames: number of cameras.
+        width: px.
+        height: px.
+        vertices: (V, 3) mm, as for orbit_camera.
+        pitch: radians, as for orbit_camera.
+        fov: radians, as for orbit_camera.
 
     Raises:
         InputError: as orbit_camera; fewer than one frame.
@@ -84,7 +92,7 @@ def turntable(
 
 
 def _turn_head(yaw: float, pitch: float) -> Float[Array, "3 3"]:
-    """Rotation of the head that shows a fixed camera what one at yaw and pitch would see."""
+    """Rotation of the head equivalent to moving the camera by yaw and pitch."""
     c, s = np.cos(yaw), np.sin(yaw)
     about_y = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
     c, s = np.cos(pitch), np.sin(pitch)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mien.arrays import Array, UInt8
-from mien.report.sheet import arranged
+from mien.report.sheet import arrange_grid
 from mien.report.track.caption import draw_text
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
@@ -33,7 +33,7 @@ def example_sheet(
     for index, example in enumerate(example_set.examples):
         reason = why.get(example.name, "") + ", shows teeth" * (index in example_set.teeth)
         cells.append(np.concatenate([_face(example), _caption(example.name, reason)]))
-    return arranged(cells, columns)
+    return arrange_grid(cells, columns)
 
 
 def _face(example: Example) -> UInt8[Array, "h w 3"]:

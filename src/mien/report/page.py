@@ -1,4 +1,4 @@
-"""`report.html`: one file, with its pictures inside, that opens anywhere."""
+"""`report.html`: one file that contains its pictures."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from mien.report.pictures import (
 
 @dataclass(frozen=True)
 class ReportInput:
-    """What a report tells about.
+    """Contents of a report.
 
     Attributes:
         head: the result.
         photos: (h, w, 3) pixels by photo name.
-        fits: by expression, with every mark and its residual.
+        fits: by expression, with every observation and its residual.
         coverage: (H, W) summed texture weights in the atlas; 0 where no photo shows the texel.
-        notes: what the user should know.
+        notes: for the user.
         turntable: a video beside the report, or "".
     """
 
@@ -49,7 +49,8 @@ def render_report(data: ReportInput, *, progress: StepProgress = no_step_progres
     """The page's HTML.
 
     Args:
-        progress: told the steps done and their total.
+        data: contents.
+        progress: called with the steps done and their total.
     """
     from jinja2 import Environment, PackageLoader
 

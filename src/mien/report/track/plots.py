@@ -17,7 +17,7 @@ from mien.io.files.image import save_image
 from mien.progress import StepProgress, no_step_progress
 from mien.render.picture import GREY, HeadRenderer
 from mien.render.shade import over_background
-from mien.report.sheet import arranged
+from mien.report.sheet import arrange_grid
 from mien.report.track.caption import draw_text, mark_lost
 from mien.report.track.charts import Plot, build_plots
 from mien.report.track.comparison import draw_tracked_head
@@ -179,7 +179,7 @@ def contact_sheet(
             below = over_background(drawn.picture, GREY)[..., :3]
         above = draw_text(frame, str(tracked.frame), _WHITE, at=(0.12, 0.06), size=15, outline=2)
         cells.append(np.concatenate([above, below]))
-    return arranged(cells, columns)
+    return arrange_grid(cells, columns)
 
 
 def summary(track: Track, series: Series) -> list[tuple[str, str]]:

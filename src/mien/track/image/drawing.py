@@ -16,7 +16,7 @@ from mien.numeric.kernels.jit import njit
 from mien.numeric.kernels.threads import for_row_bands
 from mien.numeric.raster.rasterizer import Raster, empty_raster, rasterize_rows
 from mien.render.mipmap import Four, Pyramids, level_of_detail, place_lookup, weighted_texels
-from mien.render.mix import Painted
+from mien.render.multitexture import TexturedMesh
 from mien.rig.state import PosedFace
 from mien.track.image.frame_pyramid import View
 from mien.track.image.greyscale import GreyPyramids, add_greys
@@ -72,7 +72,7 @@ class Drawing(NamedTuple):
 
 
 def draw(
-    painted: Painted,
+    painted: TexturedMesh,
     grey: GreyPyramids,
     compared: Bool[Array, " f"],
     face: PosedFace,
@@ -102,7 +102,7 @@ def draw(
 
 
 def draw_colours(
-    painted: Painted, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, view: View
+    painted: TexturedMesh, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, view: View
 ) -> tuple[Float[Array, "h w 3"], Float[Array, "h w"]]:
     """The mixture in colour, 0 to 255, and where it is one of the compared triangles."""
     scene = _placed(painted, compared, face, pose, view)
@@ -164,7 +164,7 @@ class _Placed:
 
 
 def _placed(
-    painted: Painted, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, view: View
+    painted: TexturedMesh, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, view: View
 ) -> _Placed:
     """The face in front of the view's camera, no pixel covered yet."""
     count, textures = face.weights.shape
@@ -175,7 +175,7 @@ def _placed(
     shades = np.empty((count, 2 + textures), np.float32)
     seen = (face.vertices, face.brightness, face.weights)
     _place_vertices(*seen, motion, lens, places, points, depth, shades)
-    # As sharp as a picture of four samples a pixel (render.mix).
+    # As sharp as a picture of four samples a pixel (render.multitexture).
     shades[:, 0] = level_of_detail(painted.texels, points, painted.triangles) - 0.5
     surface = _Surface(compared, painted.triangles, painted.uvs, shades)
     return _Placed(surface, places, frozen(points), frozen(depth), empty_raster(*view.size))
