@@ -155,7 +155,7 @@ class Tremble:
         mien, smoothed, peer, alone = map(
             measure, (self.mien, self.smoothed, self.peer, self.alone)
         )
-        # Nothing trembles that is not told.
+        # 0: not measured.
         return [alone or "-", peer, mien, mien / peer, smoothed, smoothed / peer]
 
 
@@ -170,7 +170,7 @@ def tremble(clip: Clip, renderer: HeadRenderer) -> Tremble:
         else (face.rotation, face.translation, face.points[_NOSE_TIP])
         for face in clip.peer
     ]
-    # Frame by frame, the distance is not told.
+    # Without its video mode MediaPipe gives no distance.
     alone = [
         (lost, lost[0], lost[0, :2])
         if face is None

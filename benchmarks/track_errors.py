@@ -33,7 +33,7 @@ def shape_errors(
 ) -> Float[Array, " n"]:
     """(N,) mm: mean distance of the masked vertices in head space; NaN where the frame is lost.
 
-    Mixtures that look alike may have weights that differ; this tells whether they do look alike.
+    Mixtures of similar appearance may have different weights; this measures the appearance.
 
     Args:
         rigs: of the found and of the true head.

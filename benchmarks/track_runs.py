@@ -48,7 +48,7 @@ def follow(
     focal_px: float,
     fps: float,
 ) -> Followed:
-    """Track these frames from the first to the last; nothing about the first is told."""
+    """Track these frames from the first to the last; without an initial state."""
     height, width = frames[0].shape[:2]
     tracker = Tracker(head, width, height, focal_px=focal_px, detector=detector)
     found, seconds = [], []

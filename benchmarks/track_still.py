@@ -1,4 +1,4 @@
-"""Where a face holds still, told by neither tracker, and how much their poses tremble there."""
+"""Where a face holds still, by optical flow alone, and how much the tracked poses jitter there."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def frame_motion(
     first frame and where there is no face.
 
     Args:
-        points: landmarks, which only tell in what box to look for corners.
+        points: landmarks, which only bound the box in which corners are sought.
     """
     import cv2
 

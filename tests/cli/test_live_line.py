@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mien.cli.live_line import live_line, status_text, summary_text
+from mien.cli.live_line import live_line, live_summary_text, status_text
 from mien.pipelines.tracking.live_loop import LiveStatus, LiveSummary
 
 STATUS = LiveStatus(120, "reacquired", 29.84, 0.0412, 3)
@@ -15,9 +15,9 @@ def test_texts_of_status_and_summary() -> None:
     assert status_text(STATUS) == expected
     summary = LiveSummary(300, 4, 3, 10.0, 29.9, 0.0412)
     expected = "300 frames, 29.9 a second, 4 lost, 3 pictures dropped"
-    assert summary_text(summary) == f"{expected}, 41 ms from picture to packet"
+    assert live_summary_text(summary) == f"{expected}, 41 ms from picture to packet"
     none = LiveSummary(0, 0, 0, 0.0, 0.0, None)
-    assert summary_text(none) == "0 frames, 0.0 a second, 0 lost, 0 pictures dropped"
+    assert live_summary_text(none) == "0 frames, 0.0 a second, 0 lost, 0 pictures dropped"
 
 
 def test_a_terminal_gets_a_line(

@@ -35,7 +35,7 @@ def status_text(status: LiveStatus) -> str:
     return " | ".join(parts)
 
 
-def summary_text(summary: LiveSummary) -> str:
+def live_summary_text(summary: LiveSummary) -> str:
     """`300 frames, 29.8 a second, 4 lost, 3 pictures dropped, 41 ms from picture to packet`."""
     text = (
         f"{summary.frames} frames, {summary.fps:.1f} a second, {summary.lost} lost, "

@@ -87,7 +87,7 @@ def track(
     if files is not None:
         files.check(Path(video), read=[head])
     if is_live:
-        from mien.cli.live_line import live_line, summary_text
+        from mien.cli.live_line import live_line, live_summary_text
         from mien.pipelines.live import track_live_video
 
         with live_line(json_) as on_status:
@@ -101,7 +101,7 @@ def track(
                 seconds=seconds,
                 on_status=on_status,
             )
-        _print(json_, output, asdict(summary), summary_text(summary), summary.notes)
+        _print(json_, output, asdict(summary), live_summary_text(summary), summary.notes)
     elif files is not None:
         from mien.pipelines.track import FRAME_STAGES, track_video
 
