@@ -90,6 +90,7 @@ class Tracker:
     layout: Layout = LAYOUT
     seen: list[tuple[int, int, float]] = field(default_factory=list)
     interrupted: Callable[[int], bool] = lambda frame: False
+    tracked: list[TrackedFrame] = field(default_factory=list)
 
     def step(self, pixels: Array, frame: int, time: float) -> TrackedFrame:
         if self.interrupted(frame):
@@ -97,7 +98,8 @@ class Tracker:
         self.seen.append((pixels.shape[0], int(pixels[0, 0, 0]), time))
         self.clock.now += STEP
         state = None if frame in self.lost else random_state(self.rng)
-        return frame_of(frame, time, state, self.rng)
+        self.tracked.append(frame_of(frame, time, state, self.rng))
+        return self.tracked[-1]
 
 
 class Receiver:
@@ -121,14 +123,11 @@ def tracker(clock: Clock, rng: np.random.Generator) -> Tracker:
 def test_every_picture_is_tracked_sent_and_reported(clock: Clock, tracker: Tracker) -> None:
     source, receivers = Source(clock), [Receiver(), Receiver()]
     tracker.lost = (3,)
-    recorded: list[TrackedFrame] = []
     told: list[LiveStatus] = []
-    summary = track_live(
-        source, tracker, receivers, on_frame=recorded.append, on_status=told.append, clock=clock
-    )
+    summary = track_live(source, tracker, receivers, on_status=told.append, clock=clock)
     indices = [0, 1, 3, 4, 6, 7]
     assert tracker.seen == [(64, 10 * index, index / 25) for index in indices]
-    assert [frame.frame for frame in recorded] == indices
+    assert [frame.frame for frame in tracker.tracked] == indices
     assert [status.frame for status in told] == indices
     assert [status.status for status in told] == ["ok", "ok", "lost", "ok", "ok", "ok"]
     for receiver in receivers:
@@ -167,11 +166,11 @@ def test_it_stops_after_so_many_seconds(
 
 
 def test_ctrl_c_ends_it_and_keeps_what_was_tracked(clock: Clock, tracker: Tracker) -> None:
-    source, recorded = Source(clock), list[TrackedFrame]()
+    source = Source(clock)
     tracker.interrupted = lambda frame: frame == 4
-    summary = track_live(source, tracker, on_frame=recorded.append, clock=clock)
+    summary = track_live(source, tracker, clock=clock)
     assert source.closed
-    assert summary.frames == len(recorded) == 3
+    assert summary.frames == len(tracker.tracked) == 3
 
 
 def test_nothing_to_track(clock: Clock, tracker: Tracker) -> None:

@@ -90,7 +90,6 @@ def run_live(
     *,
     seconds: float | None = None,
     max_side: int | None = None,
-    on_frame: Callable[[TrackedFrame], None] = lambda frame: None,
     on_status: Callable[[LiveStatus], None] = lambda status: None,
 ) -> LiveSummary:
     """Open a source and streams, track, and close them again.
@@ -102,7 +101,6 @@ def run_live(
         streams: addresses, as for `parse_stream`.
         seconds: as for `track_live`.
         max_side: as for `track_live`.
-        on_frame: as for `track_live`.
         on_status: as for `track_live`.
 
     Raises:
@@ -121,7 +119,6 @@ def run_live(
             opened,
             seconds=seconds,
             max_side=max_side,
-            on_frame=on_frame,
             on_status=on_status,
         )
         notes = (note for stream in opened for note in stream.notes)
@@ -147,7 +144,6 @@ def track_live(
     *,
     seconds: float | None = None,
     max_side: int | None = None,
-    on_frame: Callable[[TrackedFrame], None] = lambda frame: None,
     on_status: Callable[[LiveStatus], None] = lambda status: None,
     clock: Callable[[], float] = time.monotonic,
 ) -> LiveSummary:
@@ -159,7 +155,6 @@ def track_live(
         receivers: that every frame is sent to.
         seconds: of the source, after which tracking ends.
         max_side: px; larger pictures are tracked reduced to it.
-        on_frame: called with every tracked frame.
         on_status: called after every packet.
         clock: the source's.
     """
@@ -176,7 +171,6 @@ def track_live(
             moment = moment_from_frame(frame, tracker.layout)
             for receiver in receivers:
                 receiver.send(moment, frame.time)
-            on_frame(frame)
             on_status(meter.count(frame, clock(), picture.taken, source.dropped))
     return meter.summary(source)
 
