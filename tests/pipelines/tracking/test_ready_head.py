@@ -23,13 +23,13 @@ def test_lens_and_tracker_share_what_is_slow(monkeypatch: pytest.MonkeyPatch) ->
         for module in ("mien.pipelines.tracking.ready_head", "mien.track.tracker"):
             monkeypatch.setattr(f"{module}.{name}", make)
 
-    for name in ("TrackedFace", "Starter"):
+    for name in ("FaceModel", "Starter"):
         counted(name)
     ready = ReadyHead(patterned.head(), Blind(), TrackOptions(units=("jawOpen",)))
     assert made == [], "nothing before it is used"
     starter = ready.starter
     tracker = ready.tracker(64, 48, 100.0)
-    assert made == ["TrackedFace", "Starter"]
+    assert made == ["FaceModel", "Starter"]
     assert tracker.layout is starter.layout
     assert tracker.layout.units == ("jawOpen",)
 

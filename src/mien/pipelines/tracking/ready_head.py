@@ -7,7 +7,7 @@ from functools import cached_property
 
 from mien.capture.faces.detector import LandmarkDetector
 from mien.head import Head
-from mien.track.face_model import TrackedFace
+from mien.track.face_model import FaceModel
 from mien.track.landmarks.initialization import Starter
 from mien.track.tracker import Tracker, TrackOptions
 
@@ -21,9 +21,9 @@ class ReadyHead:
     options: TrackOptions
 
     @cached_property
-    def model(self) -> TrackedFace:
-        """What is compared with pictures. Raises: InputError: as TrackedFace."""
-        return TrackedFace(self.head, units=self.options.units)
+    def model(self) -> FaceModel:
+        """What is compared with pictures. Raises: InputError: as FaceModel."""
+        return FaceModel(self.head, units=self.options.units)
 
     @cached_property
     def starter(self) -> Starter:
