@@ -24,7 +24,7 @@ from mien.capture.video.video import Video
 from mien.head import Head
 from mien.io.head.head_folder import load_head
 from mien.render.picture import HeadRenderer
-from mien.report.track.comparison import face_pixels, face_psnr
+from mien.report.track.comparison import face_mask, face_psnr
 from mien.rig.state import PosedFace
 from mien.synthesis.heads.feature_points import feature_points_on
 from mien.synthesis.heads.synthesizer import HeadSynthesizer
@@ -118,7 +118,7 @@ def psnrs(clip: Tracked) -> dict[str, Float[Array, " f"]]:
         found, face = clip.found[row], clip.faces[row]
         assert found.state is not None
         camera = clip.track.camera(found.state)
-        inside = face_pixels(clip.head.mesh.with_vertices(face.vertices), camera)
+        inside = face_mask(clip.head.mesh.with_vertices(face.vertices), camera)
         for name, make in variants(clip).items():
             drawn = renderer.draw_posed(make(face, clip.points[row]), camera)
             matched = np.clip(drawn[..., :3] * found.gain + found.bias, 0, 255).astype(np.uint8)

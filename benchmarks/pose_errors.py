@@ -56,9 +56,9 @@ def recover(scene: Scene, head: FeatureHead) -> PoseResult:
 
 
 def adjust(scene: Scene, start: PoseResult, **priors: object) -> Adjustment:
-    """Bundle adjustment of what the five steps trusted."""
+    """Bundle adjustment of what the five steps inliers."""
     cameras = [camera for camera in start.cameras if camera is not None]
-    seen = np.where(start.trusted[..., None], scene.image_points, np.nan)
+    seen = np.where(start.inliers[..., None], scene.image_points, np.nan)
     return adjust_bundle(cameras, start.points, seen, **priors)  # type: ignore[arg-type]
 
 

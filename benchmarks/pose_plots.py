@@ -1,4 +1,4 @@
-"""Pictures for docs/method/cameras.md. Run: python -m benchmarks.pose_plots"""
+"""Pictures for docs/notes/cameras.md. Run: python -m benchmarks.pose_plots"""
 
 from __future__ import annotations
 

@@ -26,8 +26,8 @@ LONG = 1000
 
 
 @dataclass(frozen=True)
-class Drawn:
-    """What one program measured.
+class RenderTiming:
+    """Measurements of one program.
 
     Attributes:
         fps: over all frames.
@@ -53,7 +53,7 @@ def draw(
     *,
     texels: int = 2048,
     frames: int = 0,
-) -> Drawn:
+) -> RenderTiming:
     """For some seconds, or at least so many frames, in a process of its own.
 
     Raises:
@@ -63,7 +63,7 @@ def draw(
     command = [sys.executable, "-m", f"benchmarks.{module}", *values]
     root = Path(__file__).parents[1]
     done = subprocess.run(command, stdout=subprocess.PIPE, check=True, cwd=root, text=True)
-    drawn = Drawn(**json.loads(done.stdout.splitlines()[-1]))
+    drawn = RenderTiming(**json.loads(done.stdout.splitlines()[-1]))
     print(f"{module} {size} {textures}: {drawn}", file=sys.stderr)
     return drawn
 

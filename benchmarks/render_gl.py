@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.render_scene import Scene, arguments, build_scene, measure
+from benchmarks.render_scene import RenderScene, arguments, build_scene, measure
 from mien.arrays import Array
 from mien.rig.state import PosedFace
 
@@ -27,7 +27,7 @@ void main() {
     gl_Position = vec4(lens.xy * place.xy + lens.zw * place.z, z, place.z);
 }
 """
-# The same sharpness as mien's: see docs/method/texture.md.
+# The same sharpness as mien's: see docs/method/rendering.md.
 FRAGMENT = """
 #version 330
 uniform sampler2D image;
@@ -77,7 +77,7 @@ class PassRenderer:
     straight alpha of 8 bits on the GPU's side, and is read back as such.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: RenderScene) -> None:
         import moderngl
 
         self.gl: Any = moderngl

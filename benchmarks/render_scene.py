@@ -1,4 +1,4 @@
-"""What both programs draw: a head whose three regions change their mixture in every frame."""
+"""The scene of the rendering benchmark: a head whose three regions change in every frame."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ FACES = 40
 
 
 @dataclass(frozen=True)
-class Scene:
-    """Everything that is drawn, made before the clock starts.
+class RenderScene:
+    """Mesh, textures, faces and camera, prepared before the measurement.
 
     Attributes:
         mesh: the generic head, only the parts that pictures show.
         textures: K, synthetic.
-        faces: FACES moments of a movement that closes.
+        faces: FACES steps of a periodic movement.
     """
 
     mesh: Mesh
@@ -39,7 +39,7 @@ class Scene:
     camera: Camera
 
 
-def build_scene(width: int, height: int, textures: int, *, texels: int = 2048) -> Scene:
+def build_scene(width: int, height: int, textures: int, *, texels: int = 2048) -> RenderScene:
     """The generic head at a quarter turn, filling the frame as `mien render` does."""
     generic = load_generic_head()
     mesh = generic.mesh.submesh(generic.mesh.triangles_of(*shown_parts(generic.mesh)))
@@ -49,18 +49,18 @@ def build_scene(width: int, height: int, textures: int, *, texels: int = 2048) -
     faces = []
     for frame in range(FACES):
         turn = 2 * np.pi * frame / FACES
-        shares = _shares(turn, textures)
-        weights = masks.T @ shares
+        mixtures = _mixture_weights(turn, textures)
+        weights = masks.T @ mixtures
         weights[:, 0] += 1 - weights.sum(axis=1)
         vertices = mesh.vertices + 0.3 * (1 - np.cos(turn)) * jaw
         brightness = 0.85 + 0.15 * np.tanh(mesh.vertices[:, 2] / 40)
         faces.append(PosedFace(vertices, weights, brightness))
     camera = orbit_camera(0.4, width=width, height=height, vertices=mesh.vertices)
     images = tuple(_texture(index, texels) for index in range(textures))
-    return Scene(mesh, images, tuple(faces), camera)
+    return RenderScene(mesh, images, tuple(faces), camera)
 
 
-def _shares(turn: float, textures: int) -> Array:
+def _mixture_weights(turn: float, textures: int) -> Array:
     """(3, K) for mouth, eyes and forehead, summing to 1, some of them below 0 at times."""
     phases = turn + np.arange(3)[:, None] * 2 + np.arange(textures) * 2 * np.pi / textures
     moving: Array = (1 + 1.2 * np.sin(phases)) / textures

@@ -24,8 +24,8 @@ from mien.capture.video.video import Video
 from mien.head import Head
 from mien.io.head.head_folder import load_head
 from mien.render.picture import HeadRenderer
-from mien.report.track.comparison import draw_tracked, face_psnr
-from mien.report.track.series import series_of
+from mien.report.track.comparison import draw_tracked_head, face_psnr
+from mien.track.series import series_of
 from mien.track.smoothing import smooth
 from mien.track.state import Track
 
@@ -109,9 +109,9 @@ def _psnr(
 ) -> Float[Array, " n"]:
     values = np.full(len(frames), np.nan)
     for index in range(0, len(frames), every):
-        drawn = draw_tracked(renderer, track, track.frames[index])
+        drawn = draw_tracked_head(renderer, track, track.frames[index])
         if drawn is not None:
-            values[index] = face_psnr(frames[index], drawn.picture, drawn.inside)
+            values[index] = face_psnr(frames[index], drawn.picture, drawn.mask)
     return values
 
 

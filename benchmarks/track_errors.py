@@ -1,4 +1,4 @@
-"""How far a track's faces lie from the true ones (its poses: mien.report.track.series)."""
+"""How far a track's faces lie from the true ones (its poses: mien.track.series)."""
 
 from __future__ import annotations
 

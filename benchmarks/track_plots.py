@@ -19,8 +19,7 @@ from mien.capture.video.video import Video
 from mien.head import Head
 from mien.io.files.image import save_image
 from mien.io.head.head_folder import load_head
-from mien.report.track.plots import write_track_plots
-from mien.report.track.sheet import contact_sheet
+from mien.report.track.plots import contact_sheet, save_track_plots
 from mien.track.state import Track
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
@@ -37,7 +36,7 @@ def synthetic(detector: LandmarkDetector) -> None:
     found = follow(head, scene.frames, detector, focal_px=truth.focal_px, fps=truth.fps)
     _sheet("tracking-known", scene.frames, found.track, head)
     with tempfile.TemporaryDirectory() as folder:
-        write_track_plots(folder, found.track, reference=truth)
+        save_track_plots(folder, found.track, reference=truth)
         for name in PLOTS:
             target = IMAGES / f"tracking-{name.replace('_', '-')}.png"
             target.write_bytes((Path(folder) / f"{name}.png").read_bytes())

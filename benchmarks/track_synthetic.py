@@ -31,9 +31,9 @@ from mien.assets.generic import load_generic_head
 from mien.capture.faces.detector import LandmarkDetector
 from mien.head import Head
 from mien.io.head.head_folder import load_head
-from mien.report.track.plots import write_track_plots
-from mien.report.track.series import rotation_errors, series_of, translation_errors, truth_for
+from mien.report.track.plots import save_track_plots
 from mien.rig.rig import Rig
+from mien.track.series import rotation_errors, series_of, translation_errors, truth_for
 
 HEADER = (
     "",
@@ -166,7 +166,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 truth = measurement.scenes[change.plain].truth
                 folder = asked.plots / change.name.replace(" ", "_")
                 track = outcome.followed.track
-                write_track_plots(folder, track, reference=truth, title=change.name)
+                save_track_plots(folder, track, reference=truth, title=change.name)
     scene = measurement.scenes[True]
     intro = INTRO.format(
         who="A made-up head" if asked.head is None else f"The head {asked.head.name}",

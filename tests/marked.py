@@ -14,7 +14,7 @@ from mien.capture.faces.detector import LandmarkDetector
 from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES, DetectedFace
 from mien.head import Head
 from mien.numeric.rotation import rotation_from_vector
-from mien.track.landmarks.initialization import Starter
+from mien.track.landmarks.initialization import HeadDetector
 from mien.track.state import Layout, TrackState
 
 SIZE, FOCAL = (640, 480), 800.0
@@ -48,19 +48,19 @@ class Shown(Blind):
         return [] if face is None else [face]
 
 
-def prepared(head: Head, layout: Layout) -> Starter:
+def prepared(head: Head, layout: Layout) -> HeadDetector:
     """One whose detector errs by a millimetre and scores a unit of the layout by its weight."""
-    one = Starter(head, layout, Blind())
-    sigma = np.where(np.isfinite(one.marks.sigma_mm), 1.0, np.inf)
-    score_moves = np.zeros_like(one.marks.score_moves)
-    for row, name in enumerate(layout.units, len(score_moves) - len(layout.units)):
-        score_moves[row, BLENDSHAPE_NAMES.index(name)] = 1.0
-    one.marks = replace(one.marks, score_moves=score_moves, sigma_mm=sigma)
+    one = HeadDetector(head, layout, Blind())
+    sigma = np.where(np.isfinite(one.model.sigma_mm), 1.0, np.inf)
+    score_offsets = np.zeros_like(one.model.score_offsets)
+    for row, name in enumerate(layout.units, len(score_offsets) - len(layout.units)):
+        score_offsets[row, BLENDSHAPE_NAMES.index(name)] = 1.0
+    one.model = replace(one.model, score_offsets=score_offsets, sigma_mm=sigma)
     return one
 
 
 @cache
-def starter() -> Starter:
+def head_detector() -> HeadDetector:
     """Of the head as usual."""
     return prepared(posable.head(), LAYOUT)
 
@@ -80,13 +80,13 @@ def posed(degrees: tuple[float, float, float] = (5, -12, 4), **changes: Array) -
 
 
 def face_of(
-    state: TrackState, *, noise: Array | float = 0.0, of: Starter | None = None
+    state: TrackState, *, noise: Array | float = 0.0, of: HeadDetector | None = None
 ) -> DetectedFace:
     """What a detector without error, but one of 8 degrees in rotation, says of it."""
-    marks = (of or starter()).marks
+    model = (of or head_detector()).model
     unknowns = np.concatenate([state.weights[:, 1:].ravel(), state.units])
     camera = Camera(*SIZE, FOCAL, state.R_cam_head, state.t_cam_head)
-    points = camera.project(marks.places + np.tensordot(unknowns, marks.moves, axes=1)) + noise
+    points = camera.project(model.positions + np.tensordot(unknowns, model.offsets, axes=1)) + noise
     wrong = rotation_from_vector(np.radians([4.0, -6.0, 3.0])) @ state.R_cam_head
-    scores = marks.scores + unknowns @ marks.score_moves
+    scores = model.scores + unknowns @ model.score_offsets
     return DetectedFace(np.column_stack([points, np.zeros(len(points))]), scores, wrong)

@@ -59,3 +59,20 @@ def test_every_public_name_has_a_page() -> None:
     targets = {path.removeprefix("reference/api/") for path in pages}
     links = {link for text in pages.values() for link in re.findall(r"\]\(\.\./([^)]+)\)", text)}
     assert links <= targets
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_and_pictures_of_a_page_exist(page: Path) -> None:
+    links = re.findall(r"\]\(([^)#\s]+)[^)\s]*\)", page.read_text(encoding="utf-8"))
+    assert [link for link in links if "://" not in link and not (page.parent / link).exists()] == []
+
+
+def test_every_picture_is_on_a_page() -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    pictures = sorted((ROOT / "docs" / "images").iterdir())
+    assert [picture.name for picture in pictures if f"images/{picture.name}" not in text] == []
+
+
+def test_words_of_our_own_are_few() -> None:
+    glossary = (ROOT / "docs" / "reference" / "glossary.md").read_text(encoding="utf-8")
+    assert 0 < len(re.findall(r"^\| \*\*", glossary, re.MULTILINE)) <= 25

@@ -183,20 +183,16 @@ def test_an_import_for_types_alone_makes_no_circle() -> None:
 
 
 MAX_MODULES = 15
-CROWDED = frozenset({"reconstruction/dense"})
-"""Folders with more modules, until they are divided."""
 
 
 def test_no_folder_shows_more_modules_than_a_reader_takes_in() -> None:
     for folder in [SOURCE, *(path for path in SOURCE.rglob("*") if path.is_dir())]:
         modules = [path.stem for path in folder.glob("*.py") if path.stem != "__init__"]
         name = folder.relative_to(SOURCE).as_posix()
-        assert len(modules) <= MAX_MODULES or name in CROWDED, f"{name}: {len(modules)} modules"
+        assert len(modules) <= MAX_MODULES, f"{name}: {len(modules)} modules"
 
 
-SHARED_CLASS_NAMES = frozenset(
-    {"FitOptions", "Guess", "Look", "Pictures", "Sight", "Sightings", "View"}
-)
+SHARED_CLASS_NAMES = frozenset({"FitOptions", "Guess", "Look", "Pictures", "Sight"})
 """Names of more than one public class, until they are renamed."""
 
 

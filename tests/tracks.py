@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mien.animate.from_track import FACING
+from mien.camera import FRONTAL
 from mien.numeric.rotation import rotation_from_vector
 from mien.track.state import Layout, Status, Track, TrackedFrame, TrackState
 
@@ -17,7 +17,7 @@ def random_state(rng: np.random.Generator, layout: Layout = LAYOUT) -> TrackStat
     """A head that roughly faces the camera, and any face."""
     weights = rng.normal(0.2, 0.3, (len(layout.regions), len(layout.expressions)))
     return TrackState(
-        R_cam_head=FACING @ rotation_from_vector(rng.uniform(-0.5, 0.5, 3)),
+        R_cam_head=FRONTAL @ rotation_from_vector(rng.uniform(-0.5, 0.5, 3)),
         t_cam_head=rng.normal((30, -20, 700), 20),
         weights=weights + (1 - weights.sum(axis=1, keepdims=True)) / weights.shape[1],
         units=rng.uniform(0, 1, len(layout.units)),

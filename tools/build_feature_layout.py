@@ -32,13 +32,13 @@ FRAME_CENTRE = (0.0, 0.3)
 def main() -> None:
     """Writes the layout."""
     landmarks, counterpart = front_view()
-    mixes = {name: as_row(mix) for name, mix in drawn_points().items()}
-    for name in [name for name in mixes if name.startswith("right_")]:
-        mixes[mirrored(name)] = mixes[name][counterpart]
-    names = list(mixes)
-    template = np.array([mixes[name] @ landmarks for name in names])
+    weights = {name: as_row(mix) for name, mix in drawn_points().items()}
+    for name in [name for name in weights if name.startswith("right_")]:
+        weights[mirrored(name)] = weights[name][counterpart]
+    names = list(weights)
+    template = np.array([weights[name] @ landmarks for name in names])
     template /= np.ptp(template[:, 0])
-    frame = surrounding()
+    frame = frame_ellipse()
     document = {
         "format": "mien feature points",
         "version": 1,
@@ -49,7 +49,7 @@ def main() -> None:
                 "mirror": mirrored(name),
                 "template": rounded(place),
                 "landmarks": {
-                    str(i): round(mixes[name][i], 3) for i in np.flatnonzero(mixes[name])
+                    str(i): round(weights[name][i], 3) for i in np.flatnonzero(weights[name])
                 },
             }
             for name, place in zip(names, template, strict=True)
@@ -68,8 +68,8 @@ def front_view() -> tuple[Array, Array]:
     jaw = head.unit_offsets[head.unit_names.index("jawOpen")]
     landmarks = head.landmark_positions(head.mesh.vertices + JAW_OPEN * jaw)
     mirror_image = landmarks * [-1, 1, 1]
-    apart = np.linalg.norm(landmarks[:, None] - mirror_image, axis=2)
-    _, counterpart = linear_sum_assignment(apart)
+    distances = np.linalg.norm(landmarks[:, None] - mirror_image, axis=2)
+    _, counterpart = linear_sum_assignment(distances)
     assert (counterpart[counterpart] == np.arange(len(landmarks))).all()
     even = (landmarks + mirror_image[counterpart]) / 2
     return even[:, :2] * [1, -1], counterpart
@@ -125,7 +125,7 @@ def all_sets(drawn: dict[str, str], names: list[str]) -> dict[str, list[str]]:
     return sets
 
 
-def surrounding() -> Array:
+def frame_ellipse() -> Array:
     """Points on an ellipse around the face, the first at its top."""
     angles = 2 * np.pi * np.arange(FRAME_POINTS) / FRAME_POINTS
     return FRAME_CENTRE + np.column_stack([np.sin(angles), -np.cos(angles)]) * FRAME_REACH

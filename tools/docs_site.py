@@ -1,15 +1,16 @@
 """What the documentation's site has beyond docs/: the public names, measured tables, citations.
 
 mkdocs calls the functions named `on_...` (`hooks` in mkdocs.yml). Each public name gets a page made
-of its docstring. The tables of benchmarks/results/ become pages, so that links to them work on the
-site as well as where the repository is browsed. `[Pighin 2002]` and `[Zhang 2006]` become links,
-also in docstrings.
+of its docstring. The pages of benchmarks/ become pages of the site, so links to them work there as
+well as where the repository is browsed. `[Pighin 2002]` and `[Zhang 2006]` become links, also in
+docstrings.
 """
 
 from __future__ import annotations
 
 import inspect
 import re
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from posixpath import relpath
@@ -27,7 +28,6 @@ NAMESPACES = (
     "mien",
     *sorted(f"mien.{stub.parent.name}" for stub in PACKAGE.glob("*/__init__.pyi")),
 )
-_RESULTS = "benchmarks/results"
 _CITATION = re.compile(r"\[(Pighin|Zhang) (2002|2006)\]")
 
 
@@ -79,7 +79,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         name: pages for part in config.nav if isinstance(part, dict) for name, pages in part.items()
     }
     parts["Reference"].append({"Python": [{space: pages} for space, pages in sections.items()]})
-    parts["Notes"].append({"Measured": [f"{_RESULTS}/{path.name}" for path in _results()]})
+    parts["Notes"].append({"Benchmarks": list(_benchmark_pages())})
     return config
 
 
@@ -88,17 +88,17 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     from mkdocs.structure.files import File
 
     texts = api_pages()
-    texts |= {f"{_RESULTS}/{path.name}": path.read_text("utf-8") for path in _results()}
+    texts |= {uri: (ROOT / uri).read_text("utf-8") for uri in _benchmark_pages()}
     for path, text in texts.items():
         files.append(File.generated(config, path, content=text))
     return files
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Links to the measured tables as they lie on the site."""
-    if page.file.src_uri.startswith(_RESULTS):
-        return markdown
-    return markdown.replace(f"](../../{_RESULTS}/", f"](../{_RESULTS}/")
+    """Links between docs/ and benchmarks/, which lie beside each other on the site."""
+    if page.file.src_uri.startswith("benchmarks/"):
+        return markdown.replace("](../docs/", "](../")
+    return markdown.replace("](../../benchmarks/", "](../benchmarks/")
 
 
 def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
@@ -120,5 +120,8 @@ def _summary(item: Any) -> str:
     return (inspect.getdoc(item) or "").split("\n\n")[0].replace("\n", " ").replace("|", "\\|")
 
 
-def _results() -> list[Path]:
-    return sorted((ROOT / _RESULTS).glob("*.md"))
+def _benchmark_pages() -> Iterator[str]:
+    """Their paths in the repository, which are those on the site."""
+    yield "benchmarks/README.md"
+    for path in sorted((ROOT / "benchmarks" / "results").glob("*.md")):
+        yield path.relative_to(ROOT).as_posix()

@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/method/expressions.md: python -m tools.draw_expressions HEAD.
+"""Draws the pictures of docs/guide/expressions.md: python -m tools.draw_expressions HEAD.
 
 HEAD is a head folder with several expressions, made by `mien build`.
 """

@@ -1,6 +1,7 @@
 """Draws the picture of docs' feature points: python -m tools.draw_feature_points PHOTO.
 
-Left: points and triangles. Right: the subregions with their fades. PHOTO shows an open mouth.
+Left: points and triangles. Right: the subregions with their blend weights. PHOTO shows an
+open mouth.
 """
 
 from __future__ import annotations
@@ -21,11 +22,11 @@ from mien.capture.images.photos import load_photo
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "feature-points.jpg"
 _HEIGHT = 700
 _MARGIN = 0.3
-_SHARE = 0.5
+_OPACITY = 0.5
 
 
 def main(path: str) -> None:
-    """Writes the picture."""
+    """Write the picture."""
     layout, photo = load_feature_layout(), load_photo(path)
     with LandmarkDetector() as detector:
         points = layout.from_landmarks(detector.detect(photo).points)
@@ -59,8 +60,8 @@ def _subregions(picture: Image.Image, layout: FeatureLayout, points: Float[Array
     # Neighbours in the list get hues far apart.
     hues = [(index * 5 % count) / count for index in range(count)]
     colours = 255 * np.array([colorsys.hsv_to_rgb(hue, 0.85, 1.0) for hue in hues])
-    on_face = _SHARE * subregions.fades.sum(axis=2, keepdims=True)
-    mixed = np.asarray(picture) * (1 - on_face) + _SHARE * (subregions.fades @ colours)
+    on_face = _OPACITY * subregions.fades.sum(axis=2, keepdims=True)
+    mixed = np.asarray(picture) * (1 - on_face) + _OPACITY * (subregions.fades @ colours)
     return np.clip(mixed, 0, 255).astype(np.uint8)
 
 

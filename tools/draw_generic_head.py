@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.camera import Camera
-from tools.assets.shading import Look, Paint, camera_at, paint_head, rasterize_mesh, shade
+from tools.assets.shading import Lighting, Paint, camera_at, paint_head, rasterize_mesh, shade
 
 FOLDER = Path(__file__).parents[1] / "docs" / "images"
 _UNITS = ("jawOpen", "eyeBlinkLeft", "mouthSmileLeft", "browInnerUp", "mouthPucker", "cheekPuff")
@@ -48,7 +48,7 @@ def _picture(
     mesh = head.mesh if vertices is None else head.mesh.with_vertices(vertices)
     hidden = {"lashes"} if hair else {"lashes", "hair"}
     mesh = mesh.submesh(mesh.triangles_of(*(set(mesh.part_names) - hidden)))
-    return shade(mesh, camera, paint or _paint(head), Look())
+    return shade(mesh, camera, paint or _paint(head), Lighting())
 
 
 def _paint(head: GenericHead) -> Paint:

@@ -1,4 +1,4 @@
-"""Draws the picture of docs/method/head-synthesis.md: python -m tools.draw_head_synthesis HEAD.
+"""Draws the picture of docs/guide/synthesize.md: python -m tools.draw_head_synthesis HEAD.
 
 HEAD is a head folder with the expressions of `cap13_edit2.mp4`, made by `mien build`.
 """

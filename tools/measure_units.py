@@ -1,4 +1,4 @@
-"""Measures the figures of docs/method/face-units.md: python -m tools.measure_units HEAD.
+"""Measures the figures of docs/notes/face-units.md: python -m tools.measure_units HEAD.
 
 HEAD is a head folder, made by `mien build`; without one the generic head is measured. Depths are
 in mm: of lids in the eyeballs, of one lip in the other, both beyond what they are when the face is
@@ -23,7 +23,7 @@ from mien.rig.deformer import Contacts, FaceDeformer, fit_units
 from mien.rig.gaze import SIDES
 from mien.rig.unit_transfer import transfer_units
 
-_LEAST_MM = 0.1
+_MIN_MM = 0.1
 _VIEWS = [(yaw, pitch) for yaw in (-30, 0, 30) for pitch in (-20, 0, 20)]
 _PX_PER_MM = 30.0
 _DISTANCE_MM = 700.0
@@ -72,7 +72,7 @@ def _print_depths(
             live = deformer.deform(neutral, np.eye(len(units))[chosen].sum(axis=0))
             states = [raw, sound, (neutral + sound) / 2, live]
             found = [depth(contacts, state) for state in states]
-            if max(found) > _LEAST_MM:
+            if max(found) > _MIN_MM:
                 title = " + ".join(generic.unit_names[n] for n in chosen)
                 print(f"| {title} |", " | ".join(f"{d:.2f}" for d in found), "|")
 

@@ -8,6 +8,9 @@ import numpy as np
 
 from mien.arrays import Array, Float, check_array, check_positive, check_rotation, frozen
 
+FRONTAL = frozen(np.diag([1.0, -1.0, -1.0]))
+"""(3, 3) R_cam_head of an upright head that faces the camera."""
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -90,3 +93,16 @@ class Camera:
             focal_px=self.focal_px * factor,
             principal_px=self.principal * factor,
         )
+
+
+def head_angles_deg(camera: Camera) -> tuple[float, float, float]:
+    """Degrees of yaw, pitch and roll of the head before the camera (docs/reference/conventions.md).
+
+    The same three angles given to `mien render` show the head turned like that.
+    """
+    # The head's x (subject's left), y (up) and z (out of the face) as the camera has them.
+    left, up, out = camera.R_cam_head.T
+    yaw = np.degrees(np.arctan2(left[2], -out[2]))
+    pitch = np.degrees(np.arcsin(np.clip(-up[2], -1, 1)))
+    roll = np.degrees(np.arctan2(-up[0], -up[1]))
+    return float(yaw), float(pitch), float(roll)

@@ -69,7 +69,7 @@ class EstimationError(MienError):
 
 
 class DocumentError(Exception):
-    """Something else than expected at a place of a document; whoever reads the file names it."""
+    """An unexpected value at a place of a document; the reader of the file adds the file's name."""
 
     def __init__(self, place: str, problem: str) -> None:
         self.place, self.problem = place, problem

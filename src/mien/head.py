@@ -30,7 +30,7 @@ class FittedView:
         camera: in the pixels of the photo after EXIF orientation.
         rms_px: root mean square reprojection error of the points used.
         points_used: number of inliers, points of this photo that determine camera and shape.
-        distrusted: outliers: the reason by point name for every point that was not used.
+        outliers: the reason by point name for every point that was not used.
         gains: (3,) factors of its colours in the texture, which equalize the photos' exposure.
 
     Raises:
@@ -41,7 +41,7 @@ class FittedView:
     camera: Camera
     rms_px: float
     points_used: int
-    distrusted: dict[str, str] = field(default_factory=dict)
+    outliers: dict[str, str] = field(default_factory=dict)
     gains: Float[Array, " 3"] = field(default_factory=lambda: np.ones(3))
 
     def __post_init__(self) -> None:

@@ -1,6 +1,6 @@
-"""How much of anything is read and made; what is beyond is refused before any work.
+"""Limits of what is read and made; anything beyond is refused before any work.
 
-docs/reference/limits.md is about them. Every limit has its number here alone.
+docs/reference/limits.md explains them. Every limit is defined here only.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ MAX_GAP_SECONDS = 3600.0
 MAX_SIDE = 8192
 """px, of a picture that is drawn, of a texture."""
 MAX_PHOTO_SIDE = 65_535
-"""px, of a photo or a video that a camera belongs to: a JPEG's own limit."""
+"""px, of a photo or a video of a camera: a JPEG's own limit."""
 MAX_MM = 10_000.0
 """Of a vertex' coordinate and of a face unit's offset, from 0 either way."""
 
@@ -31,7 +31,7 @@ UNIT_RANGE = (-0.5, 1.5)
 """Weight of a face unit, the lowest and the highest: as those of photographed expressions."""
 
 LARGEST = 1e9
-"""No number in a document is larger: sums and products of such stay exact enough."""
+"""Of numbers in a document: sums and products of such stay exact enough."""
 MAX_DIGITS = 1000
 """Of a whole number in a JSON document."""
 MAX_DEPTH = 64
@@ -43,13 +43,13 @@ MAX_JSON_BYTES = 64 * MIB
 MAX_TABLE_BYTES = 256 * MIB
 """Of a track's or a recording's .csv, and of a journal."""
 MAX_LINE = MIB
-"""Letters of a line in one of these."""
+"""Characters of a line in one of these."""
 MAX_POINTS_BYTES = 4 * MIB
 """Of a .tem or .pts."""
 
 MAX_ARRAY_BYTES = 512 * MIB
 """Of one array in an .npz, unpacked."""
 MAX_ARRAYS_BYTES = 1024 * MIB
-"""Of all that are taken from one .npz together, unpacked."""
+"""Of all arrays that are read from one .npz, unpacked."""
 MAX_ARRAYS = 10_000
-"""How many arrays an .npz holds, wanted or not."""
+"""Arrays that an .npz holds, read or not."""

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mien.animate.from_track import FACING, rest_camera, track_moments, track_timeline
-from mien.animate.perform import frames_of, moved_camera
+from mien.animate.from_track import rest_camera, track_moments, track_timeline
+from mien.animate.perform import frame_times, moved_camera
+from mien.camera import FRONTAL
 from mien.errors import InputError
 from mien.numeric.rotation import rotation_from_vector
 from mien.rig.state import FaceState
@@ -28,7 +29,7 @@ def test_the_rest_camera_sees_every_moment_where_the_video_does(rng: np.random.G
 
 
 def test_the_head_at_rest_faces_the_camera_where_it_mostly_was(rng: np.random.Generator) -> None:
-    facing = replace(random_state(rng), R_cam_head=FACING)
+    facing = replace(random_state(rng), R_cam_head=FRONTAL)
     away = replace(facing, t_cam_head=facing.t_cam_head + 300)
     track = track_of([facing, away, facing], rng)
     still, moved, _ = track_moments(track)
@@ -41,7 +42,7 @@ def test_the_head_at_rest_faces_the_camera_where_it_mostly_was(rng: np.random.Ge
 def test_yaw_turns_to_the_subjects_left_and_pitch_down(rng: np.random.Generator) -> None:
     vectors = ((0, 0.3, 0), (0.2, 0, 0), (0, 0, -0.1))
     states = [
-        replace(random_state(rng), R_cam_head=FACING @ rotation_from_vector(np.array(vector)))
+        replace(random_state(rng), R_cam_head=FRONTAL @ rotation_from_vector(np.array(vector)))
         for vector in vectors
     ]
     tracks = track_timeline(track_of(states, rng)).tracks
@@ -71,11 +72,11 @@ def test_times_count_from_the_first_frame_and_fill_the_video(rng: np.random.Gene
     timeline = track_timeline(track)
     times = [moment.time for moment in track_moments(track)]
     np.testing.assert_allclose(times, np.arange(9) / 25, atol=1e-12)
-    np.testing.assert_allclose(frames_of(timeline), times, atol=1e-12)
+    np.testing.assert_allclose(frame_times(timeline), times, atol=1e-12)
     assert timeline.fps == 25
 
 
-def test_lost_frames_are_bridged_by_their_neighbours(rng: np.random.Generator) -> None:
+def test_lost_frames_are_interpolated(rng: np.random.Generator) -> None:
     first, last = random_state(rng), random_state(rng)
     track = track_of([None, first, None, None, last, None], rng)
     jaw = [moment.state.units["jawOpen"] for moment in track_moments(track)]
@@ -86,7 +87,7 @@ def test_lost_frames_are_bridged_by_their_neighbours(rng: np.random.Generator) -
 def test_a_turn_past_the_back_goes_on(rng: np.random.Generator) -> None:
     angles = np.linspace(2.8, 3.5, 8)
     turns = [
-        replace(random_state(rng), R_cam_head=FACING @ rotation_from_vector(np.array([0, a, 0])))
+        replace(random_state(rng), R_cam_head=FRONTAL @ rotation_from_vector(np.array([0, a, 0])))
         for a in angles
     ]
     yaw = track_timeline(track_of(turns, rng)).tracks["head.yaw"].values
@@ -101,10 +102,10 @@ def test_frames_of_one_time_show_the_first(rng: np.random.Generator) -> None:
     assert curve.values.tolist() == [states[0].units[0], states[2].units[0]]
 
 
-def test_one_frame_is_a_performance(rng: np.random.Generator) -> None:
+def test_a_track_of_one_frame(rng: np.random.Generator) -> None:
     timeline = track_timeline(track_of([random_state(rng)], rng))
     assert timeline.duration == pytest.approx(1 / 25)
-    assert len(frames_of(timeline)) == 1
+    assert len(frame_times(timeline)) == 1
 
 
 def test_a_track_without_a_face_is_refused(rng: np.random.Generator) -> None:

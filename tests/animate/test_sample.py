@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mien.animate.perform import frames_of
+from mien.animate.perform import frame_times
 from mien.animate.sample import SAMPLE_TIMELINE
 from mien.animate.timeline import Timeline
 from mien.assets.generic import load_generic_head
@@ -32,7 +32,7 @@ def test_it_needs_nothing_but_units(sample: Timeline) -> None:
 
 
 def test_its_values_are_those_of_a_face(sample: Timeline) -> None:
-    values = sample.sample(frames_of(sample, 120))
+    values = sample.sample(frame_times(sample, 120))
     for channel, row in values.items():
         if channel.startswith("units."):
             assert row.min() >= 0, channel
@@ -43,7 +43,7 @@ def test_its_values_are_those_of_a_face(sample: Timeline) -> None:
 
 
 def test_it_blinks_and_never_stands_still(sample: Timeline) -> None:
-    values = sample.sample(frames_of(sample))
+    values = sample.sample(frame_times(sample))
     blinks = np.diff((values["units.eyeBlinkLeft"] > 0.5).astype(int)) == 1
     assert 3 <= blinks.sum() <= 6
     yaw = values["head.yaw"] + values["head.pitch"] + values["head.roll"]

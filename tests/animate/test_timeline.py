@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mien.animate.channels import head_angles_rad, head_rotation, split
+from mien.animate.channels import head_angles_rad, head_rotation, split_channel
 from mien.animate.curves import Curve, constant
 from mien.animate.layers import Blink
 from mien.animate.timeline import Clip, Layer, Placement, Timeline
@@ -99,7 +99,7 @@ def test_angles_turn_the_way_the_conventions_say(angles, point, towards) -> None
     assert moved @ np.array(towards) > 0.09
 
 
-def test_angles_come_back(rng: np.random.Generator) -> None:
+def test_angles_round_trip(rng: np.random.Generator) -> None:
     for angles in rng.uniform(-1.4, 1.4, (20, 3)):
         np.testing.assert_allclose(head_angles_rad(head_rotation(*angles)), angles, atol=1e-12)
 
@@ -157,4 +157,4 @@ def test_bad_placements_are_named() -> None:
         Placement("smile", 0, speed=0)
     with pytest.raises(InputError, match="at and weight: expected finite"):
         Placement("smile", float("nan"))
-    assert split("left_mouth.joy") == ("left_mouth", "joy")
+    assert split_channel("left_mouth.joy") == ("left_mouth", "joy")

@@ -52,7 +52,7 @@ def test_the_template_is_symmetric_and_one_wide(layout: FeatureLayout) -> None:
     assert layout.template[layout.index("chin"), 1] > layout.template[layout.index("nose_tip"), 1]
 
 
-def test_every_point_is_a_mix_of_landmarks(layout: FeatureLayout) -> None:
+def test_every_point_is_an_affine_combination_of_landmarks(layout: FeatureLayout) -> None:
     np.testing.assert_allclose(layout.landmark_weights.sum(axis=1), 1, atol=1e-12)
     assert (layout.landmark_weights >= 0).all()
     assert np.linalg.matrix_rank(layout.landmark_weights) >= 128  # Teeth come from the lips.
@@ -152,7 +152,7 @@ def test_the_frame_follows_the_head_and_no_expression(layout: FeatureLayout) -> 
     np.testing.assert_array_equal(layout.frame(moved), layout.frame(points))
 
 
-def test_unknown_points_are_told_with_close_ones(layout: FeatureLayout) -> None:
+def test_unknown_points_are_answered_with_close_names(layout: FeatureLayout) -> None:
     with pytest.raises(InputError, match=r"such as left_chin.*got left_chinn"):
         layout.index("left_chinn")
     with pytest.raises(InputError, match=r"landmarks: expected shape \(478, 2\)"):
@@ -196,7 +196,7 @@ def _stored() -> dict[str, Any]:
         (put("frame", 0, to=[0, float("nan")]), "frame: expected finite numbers"),
     ],
 )
-def test_a_bad_layout_is_told_in_one_line(
+def test_an_error_in_a_layout_is_one_line(
     tmp_path: Path, change: Callable[[Any], None], message: str
 ) -> None:
     document = _stored()
@@ -209,7 +209,7 @@ def test_a_bad_layout_is_told_in_one_line(
     assert "\n" not in str(raised.value)
 
 
-def test_files_that_are_no_json_are_told(tmp_path: Path) -> None:
+def test_files_that_are_no_json_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="a readable file"):
         load_feature_layout(tmp_path / "none.json")
     (tmp_path / "bad.json").write_bytes(b"\xff{")

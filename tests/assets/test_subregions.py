@@ -1,4 +1,4 @@
-"""Subregions: shares sum to 1, blend by eq. (7) on skin, end hard at eyes and lips."""
+"""Subregions: weights sum to 1, blend by eq. (7) on skin, end hard at eyes and lips."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def subregions(layout: FeatureLayout, points: np.ndarray) -> Subregions:
 
 def at(subregions: Subregions, place: np.ndarray) -> dict[str, float]:
     column, row = np.floor(place).astype(int)
-    shares = subregions.fades[row, column]
-    return {n: float(s) for n, s in zip(subregions.names, shares, strict=True) if s > 0}
+    weights = subregions.fades[row, column]
+    return {n: float(s) for n, s in zip(subregions.names, weights, strict=True) if s > 0}
 
 
 def test_there_are_14_with_the_teeth_last(subregions: Subregions) -> None:
@@ -50,7 +50,7 @@ def test_there_are_14_with_the_teeth_last(subregions: Subregions) -> None:
     assert subregions.fades.dtype == np.float32
 
 
-def test_shares_sum_to_one_on_the_face_and_to_nothing_far_off(
+def test_weights_sum_to_one_on_the_face_and_to_zero_far_off(
     layout: FeatureLayout, points: np.ndarray, subregions: Subregions
 ) -> None:
     sums = subregions.fades.sum(axis=2)
@@ -82,8 +82,8 @@ def test_shares_sum_to_one_on_the_face_and_to_nothing_far_off(
 def test_points_lie_in_their_subregions(
     layout: FeatureLayout, points: np.ndarray, subregions: Subregions, region: str, names: list[str]
 ) -> None:
-    shares = at(subregions, points[[layout.index(n) for n in names]].mean(axis=0))
-    assert shares == {region: pytest.approx(1)}
+    weights = at(subregions, points[[layout.index(n) for n in names]].mean(axis=0))
+    assert weights == {region: pytest.approx(1)}
     members = subregions.members[subregions.names.index(region)]
     assert {layout.index(name) for name in names} <= set(members.tolist())
 
@@ -115,8 +115,8 @@ def test_eyes_and_outer_lips_have_hard_borders(
 ) -> None:
     """No pixel is shared between what is inside and what is outside."""
     within = [subregions.names.index(name) for name in inside]
-    shares = subregions.fades[..., within].sum(axis=2)
-    assert set(np.unique(np.round(shares, 5)).tolist()) == {0.0, 1.0}
+    weights = subregions.fades[..., within].sum(axis=2)
+    assert set(np.unique(np.round(weights, 5)).tolist()) == {0.0, 1.0}
 
 
 def test_lips_and_teeth_blend(subregions: Subregions) -> None:
@@ -135,8 +135,8 @@ def test_borders_avoid_where_wrinkles_run(
         steps = np.linspace(0, 1, 9)[:, None]
         lines = [a + steps * (b - a) for a, b in pairwise(ends)]
         owners = [at(subregions, place) for place in np.vstack(lines)]
-        assert all(max(shares.values()) > 0.99 for shares in owners)
-        return {max(shares, key=lambda name: shares[name]) for shares in owners}
+        assert all(max(weights.values()) > 0.99 for weights in owners)
+        return {max(weights, key=lambda name: weights[name]) for weights in owners}
 
     assert alone(["right_forehead.1", "right_forehead.0", "forehead", "left_forehead.1"]) == {
         "forehead"
@@ -167,7 +167,7 @@ def test_members_do_not_depend_on_the_person(
         np.testing.assert_array_equal(one, same)
 
 
-def test_bad_calls_are_told(layout: FeatureLayout, points: np.ndarray) -> None:
+def test_bad_calls_are_refused(layout: FeatureLayout, points: np.ndarray) -> None:
     with pytest.raises(InputError, match=r"standard_points: expected shape \(134, 2\)"):
         default_subregions(layout, points[:-1], SIZE)
     with pytest.raises(InputError, match="size: expected a width and height"):
@@ -197,7 +197,7 @@ def test_bad_calls_are_told(layout: FeatureLayout, points: np.ndarray) -> None:
         (put("regions", 0, "corners", to=[]), "right_cheek.corners: expected at least 3, found 0"),
     ],
 )
-def test_a_bad_drawing_is_told_in_one_line(
+def test_an_error_in_a_drawing_is_one_line(
     tmp_path: Path, layout: FeatureLayout, change: Callable[[Any], None], message: str
 ) -> None:
     shipped = Path(mien.assets.__file__).parent / "data" / "zhang134_subregions.json"
@@ -225,9 +225,7 @@ def test_a_users_drawing_is_used(layout: FeatureLayout, points: np.ndarray) -> N
     assert len(subregions.members[0]) > 50
 
 
-def test_a_region_that_no_point_tells_of_is_refused(
-    layout: FeatureLayout, points: np.ndarray
-) -> None:
+def test_a_region_without_points_is_refused(layout: FeatureLayout, points: np.ndarray) -> None:
     """A speck of the frame, off the face."""
     drawing = load_subregion_drawing(layout)
     corner = np.eye(1, drawing.corners[0].shape[1], len(layout.names))

@@ -8,7 +8,7 @@ def test_a_note_on_one_picture_names_it() -> None:
     assert merge_notes(notes) == ["a.png: odd", "b.png: small"]
 
 
-def test_a_few_are_all_named() -> None:
+def test_up_to_three_names_are_listed() -> None:
     notes = [("a.png", "odd"), ("b.png", "odd"), ("c.png", "odd")]
     assert merge_notes(notes) == ["a.png, b.png, c.png: odd"]
 
@@ -23,6 +23,6 @@ def test_notes_that_differ_in_numbers_are_alike() -> None:
     assert merge_notes(notes) == ["a.png, b.png: scaled from 300x400 (numbers of the first)"]
 
 
-def test_which_photo_is_meant_stays_told() -> None:
+def test_a_note_keeps_the_name_of_its_photo() -> None:
     notes = [("b.png", "left out: the same as 1.png"), ("c.png", "left out: the same as 2.png")]
     assert merge_notes(notes) == [f"{name}: {note}" for name, note in notes]

@@ -216,7 +216,7 @@ def test_video(shared: Path) -> None:
 def test_expressions_of_a_video_without_a_face_are_left_out(
     tmp_path: Path, faces: dict[str, Array], wall: Array, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What the quick look takes for a face may be none when looked at closely."""
+    """A face of the fast detection may not be confirmed by the full one."""
     asked: list[int | None] = []
 
     def pick(path: Path, *, expressions: int | None, **options: object) -> PickedFrames:

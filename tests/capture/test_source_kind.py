@@ -87,7 +87,7 @@ def test_the_handed_clips(shared: Path, tmp_path: Path, name: str) -> None:
     assert kind_of_source(shutil.copy(handed, tmp_path / "clip")) == "video"
 
 
-def test_what_cannot_be_told_is_what_its_name_says(tmp_path: Path) -> None:
+def test_unrecognized_bytes_are_what_the_name_says(tmp_path: Path) -> None:
     for name, kind in (("a.mp4", "video"), ("a.MPG", "video"), ("a.jpg", "photo")):
         (tmp_path / name).write_text("no such thing")
         assert kind_of_source(tmp_path / name) == kind

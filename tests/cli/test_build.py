@@ -93,7 +93,7 @@ def test_what_json_says(built: Built) -> None:
     for photo, view in zip(photos, head.views, strict=True):
         assert photo["focal_px"] == pytest.approx(view.camera.focal_px, abs=0.01)
         assert photo["points_used"] == view.points_used
-        assert photo["distrusted"] == view.distrusted
+        assert photo["distrusted"] == view.outliers
     assert summary["left_out"] == {}
     scaled, doubt = summary["notes"]
     assert scaled == "left.png, right.png: marks made at 1200x1600 are scaled to 375x500"

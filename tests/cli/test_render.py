@@ -203,7 +203,7 @@ def test_past_what_was_photographed_is_noted(expressive: Path, mien: Mien, tmp_p
         ),
     ],
 )
-def test_weights_that_no_face_may_have(
+def test_weights_out_of_range(
     options: list[str], message: str, expressive: Path, mien: Mien, tmp_path: Path
 ) -> None:
     error = mien("render", expressive, "-o", tmp_path / "a.png", *options).error

@@ -18,7 +18,7 @@ import pytest
 
 import posable
 from memory import peak_bytes
-from mien.animate.perform import frames_of
+from mien.animate.perform import frame_times
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.generic import load_generic_head
 from mien.assets.subregions import default_subregions, load_subregion_drawing
@@ -81,7 +81,7 @@ def read_head(folder: Path) -> None:
 
 def read_performance(path: Path) -> None:
     timeline = load_timeline(path)
-    times = frames_of(timeline)
+    times = frame_times(timeline)
     for moment in timeline.moments_at(times[:: max(1, len(times) // 5)]):
         assert np.isfinite(moment.rotation).all()
 
@@ -101,7 +101,7 @@ def readers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Reader]:
         pass
     (place / "timeline" / "t.json").write_text(TIMELINE)
     moments = load_timeline(place / "timeline" / "t.json")
-    save_live_link(place / "live_link" / "t.csv", moments.moments_at(frames_of(moments)))
+    save_live_link(place / "live_link" / "t.csv", moments.moments_at(frame_times(moments)))
     for suffix in ("json", "tem", "pts"):
         save_feature_points(place / "points" / f"p.{suffix}", layout, 100 * layout.template + 150)
     pixels = rng.integers(0, 256, (20, 30, 3), np.uint8).repeat(10, axis=0).repeat(10, axis=1)

@@ -23,7 +23,7 @@ def test_recovers_a_known_motion(neutral):
     assert found.scale == pytest.approx(np.hypot(1.1, 0.3))
 
 
-def test_undo_undoes(rng, neutral):
+def test_the_inverse_inverts(rng, neutral):
     points = rng.normal(size=(20, 2))
     np.testing.assert_allclose(TRUE.inverse(TRUE(points)), points, atol=1e-12)
 
@@ -39,13 +39,13 @@ def test_any_other_motion_is_further_off(rng, neutral):
         assert np.sum((moved(neutral) - target) ** 2) > best
 
 
-def test_a_motion_turns_and_shifts_as_it_says():
+def test_a_motion_turns_and_shifts_as_defined():
     """From x to y, twice as large."""
     turn = PlanarSimilarity(np.array(0.0), np.array(2.0), np.array([5.0, 1.0]))
     np.testing.assert_allclose(turn(np.array([[1.0, 0.0], [0.0, 1.0]])), [[5, 3], [3, 1]])
 
 
-def test_points_in_one_place_tell_nothing(neutral):
+def test_coinciding_points_are_refused(neutral):
     with pytest.raises(EstimationError, match="those at rest share a place"):
         estimate_planar_similarity(np.full((20, 2), 7.0), neutral)
     with pytest.raises(EstimationError, match="those that moved share a place"):

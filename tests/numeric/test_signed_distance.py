@@ -22,7 +22,7 @@ def sphere(rings: int = 24, segments: int = 48) -> tuple[Array, Array]:
     return vertices, np.stack([a, c, b, b, c, d], axis=-1).reshape(-1, 3)
 
 
-def test_depth_in_a_sphere_is_the_way_to_its_surface(rng: np.random.Generator) -> None:
+def test_depth_in_a_sphere_is_the_distance_to_its_surface(rng: np.random.Generator) -> None:
     vertices, triangles = sphere()
     points = rng.normal(size=(200, 3))
     points *= rng.uniform(0.5, 1.4, (200, 1)) / np.linalg.norm(points, axis=1, keepdims=True)

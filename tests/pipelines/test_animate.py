@@ -13,13 +13,13 @@ import pytest
 from PIL import Image
 
 from glb_file import Glb
-from mien.animate.perform import frames_of
+from mien.animate.perform import frame_times
 from mien.animate.timeline import Timeline
 from mien.arrays import Array
 from mien.head import Head
 from mien.io.head.head_folder import load_head
 from mien.io.timeline.timeline_file import load_timeline
-from mien.pipelines.animate import Take, animate_head
+from mien.pipelines.animate import AnimationResult, animate_head
 from mien.render.picture import HeadRenderer
 from terminal import Mien
 
@@ -143,11 +143,11 @@ def middle_of(head: Head) -> Array:
     return (vertices.min(axis=0) + vertices.max(axis=0)) / 2
 
 
-def test_live_link_comes_back(expressive: Path, timeline: Path, mien: Mien, tmp_path: Path) -> None:
+def test_live_link_round_trip(expressive: Path, timeline: Path, mien: Mien, tmp_path: Path) -> None:
     out = tmp_path / "a.csv"
     assert mien("animate", timeline, "--head", expressive, "-o", out, "--json").json["frames"] == 5
     given, back = load_timeline(timeline), load_timeline(out)
-    times = frames_of(given)
+    times = frame_times(given)
     wanted, found = given.sample(times), back.sample(times)
     for channel in ("units.jawOpen", "units.eyeBlinkLeft", "head.yaw"):
         np.testing.assert_allclose(found[channel], wanted[channel], atol=1e-6)
@@ -194,7 +194,7 @@ def test_from_python(expressive: Path, tmp_path: Path) -> None:
         size=(32, 40),
         progress=lambda *step: told.append(step),
     )
-    assert take == Take(frames=3)
+    assert take == AnimationResult(frames=3)
     assert told == [("Animating", done, 3) for done in range(4)]
 
 
@@ -294,7 +294,9 @@ def test_a_rate_that_makes_too_many_frames(expressive: Path, mien: Mien, tmp_pat
     )
 
 
-def test_what_the_recording_is_like_is_noted(expressive: Path, mien: Mien, tmp_path: Path) -> None:
+def test_properties_of_the_recording_are_noted(
+    expressive: Path, mien: Mien, tmp_path: Path
+) -> None:
     path = written(tmp_path)
     mien("animate", path, "--head", expressive, "-o", tmp_path / "a.csv")
     header, *rows = (tmp_path / "a.csv").read_text().splitlines()
@@ -307,7 +309,7 @@ def test_what_the_recording_is_like_is_noted(expressive: Path, mien: Mien, tmp_p
     ]
 
 
-def test_what_is_no_timeline(expressive: Path, mien: Mien, tmp_path: Path) -> None:
+def test_files_that_are_no_timeline(expressive: Path, mien: Mien, tmp_path: Path) -> None:
     for name, message in (("no.json", ""), ("take.txt", "expected a name that ends in .json or")):
         path = tmp_path / name
         error = mien("animate", path, "--head", expressive, "-o", tmp_path / "a.mp4").error

@@ -77,7 +77,7 @@ def test_a_head_of_one_expression(calls: SimpleNamespace) -> None:
         assert item.camera is photo.camera
         assert item.rms_px == photo.rms_px
         assert item.points_used == len(photo.inliers)
-        assert item.distrusted == {m.name: m.rejection for m in photo.marks if m.rejection}
+        assert item.outliers == {m.name: m.rejection for m in photo.marks if m.rejection}
     assert result.notes == ("a.png: blurred", NOTHING_SHARED)
 
 

@@ -14,8 +14,8 @@ import pytest
 import mien.pipelines.track
 import mien.pipelines.tracking.run
 from filmed import broken, grey, written
-from mien.animate.from_track import FACING
 from mien.arrays import Array
+from mien.camera import FRONTAL
 from mien.errors import EstimationError, FileFormatError, InputError, MienError
 from mien.io.tracks.track_csv import load_track
 from mien.io.tracks.track_journal import journal_of
@@ -70,7 +70,7 @@ class BrightnessTracker:
         before = [past.state.values for past in self.past if past.state is not None]
         share = float(share / 3 + sum(values[1] for values in before) / 3)
         return TrackState(
-            R_cam_head=FACING,
+            R_cam_head=FRONTAL,
             t_cam_head=np.array([0.0, 0.0, 500 + 300 * share]),
             weights=np.array([[1 - share, share]]),
             units=np.array([share]),
@@ -202,7 +202,7 @@ def test_stopped_while_it_drew(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("mien.report.track.overlay.write_overlay", stop)
+        patch.setattr("mien.report.track.overlay.save_overlay", stop)
         with pytest.raises(KeyboardInterrupt):
             track_video(clip, head(), files)
     tracked = track_video(clip, head(), files, resume=True)

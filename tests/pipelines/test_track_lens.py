@@ -23,13 +23,13 @@ def test_every_fifth_of_the_first_frames_is_looked_at(
     seen: list[Array] = []
     tracker = SimpleNamespace(resembles=lambda pixels, found: True)
 
-    def estimate(frames: object, *rest: object, is_own: object) -> FocalEstimate:
-        assert is_own is tracker.resembles
+    def estimate(frames: object, *rest: object, is_match: object) -> FocalEstimate:
+        assert is_match is tracker.resembles
         seen.extend(frames)
         return FocalEstimate(400.0, 0.1, 2, "a note")
 
     monkeypatch.setattr(mien.pipelines.track_lens, "estimate_focal", estimate)
-    monkeypatch.setattr(ReadyHead, "starter", None)
+    monkeypatch.setattr(ReadyHead, "head_detector", None)
     monkeypatch.setattr(ReadyHead, "tracker", lambda ready, *size: tracker)
     monkeypatch.setattr(mien.pipelines.track_lens, "_SIDE", 32)
     levels = range(20, 140, 10)

@@ -35,19 +35,19 @@ def test_rows_with_their_lines(tmp_path: Path) -> None:
         (b"a,b\n" + b"," * MAX_LINE + b"\n", "line 2: expected lines of at most 1048576 letters"),
     ],
 )
-def test_what_is_no_table_is_told(tmp_path: Path, content: bytes, problem: str) -> None:
+def test_what_is_no_table_is_refused(tmp_path: Path, content: bytes, problem: str) -> None:
     with pytest.raises(FileFormatError) as caught:
         rows_of(tmp_path, content)
     assert str(caught.value).startswith(f"{tmp_path / 'a.csv'}: {problem}")
 
 
-def test_what_is_no_file_is_told(tmp_path: Path) -> None:
+def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="expected a readable file, got a folder"):
         list(read_rows(tmp_path, "a table"))
 
 
 @pytest.mark.parametrize("text", ["", "x", "1_000", "٣", "nan", "inf", "1e999", "1,5", "0x10"])
-def test_what_is_no_number_is_told(text: str) -> None:
+def test_what_is_no_number_is_refused(text: str) -> None:
     assert not math.isfinite(number_in(text))
     with pytest.raises(
         FileFormatError, match=r"a\.csv: line 2, time: expected a finite number, fo"

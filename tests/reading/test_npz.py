@@ -41,7 +41,7 @@ def test_arrays_come_back(path: Path) -> None:
         arrays.numbers("fades", (None,))
 
 
-def test_what_is_no_archive_is_told(path: Path, tmp_path: Path) -> None:
+def test_what_is_no_archive_is_refused(path: Path, tmp_path: Path) -> None:
     with path.open("wb") as stream:
         np.save(stream, GEOMETRIES)
     with pytest.raises(FileFormatError, match=r"statistics\.npz: expected an \.npz file, found a"):
@@ -54,7 +54,7 @@ def test_what_is_no_archive_is_told(path: Path, tmp_path: Path) -> None:
         ArrayFile(tmp_path)
 
 
-def test_changed_bytes_are_told_of_or_harmless(path: Path) -> None:
+def test_changed_bytes_are_refused_or_harmless(path: Path) -> None:
     """Damage anywhere: in the archive's headers, in numpy's, in what is compressed."""
     whole, rng = path.read_bytes(), np.random.default_rng(3)
     told = 0
@@ -124,7 +124,7 @@ def write_claiming(path: Path, shape: tuple[int, ...], data: bytes) -> None:
         archive.writestr("geometries.npy", stream.getvalue() + data)
 
 
-def test_what_a_header_claims_is_not_believed(path: Path) -> None:
+def test_a_header_that_states_other_sizes_is_refused(path: Path) -> None:
     write_claiming(path, (10**12 // 12, 6, 2), b"")
     with pytest.raises(FileFormatError, match=r"geometries: expected at most 512 MiB, found 7629"):
         geometries(path)
@@ -136,7 +136,7 @@ def test_what_a_header_claims_is_not_believed(path: Path) -> None:
         geometries(path)
 
 
-def test_an_array_that_nobody_asks_for_is_never_unpacked(path: Path) -> None:
+def test_an_array_that_is_not_read_is_never_unpacked(path: Path) -> None:
     with (
         zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive,
         archive.open("extra.npy", "w", force_zip64=True) as stream,

@@ -60,14 +60,14 @@ def test_the_deepest_and_the_longest_pass(tmp_path: Path) -> None:
     ],
     ids=lambda value: str(value)[:40],
 )
-def test_what_is_wrong_is_told_in_one_line(tmp_path: Path, content: bytes, problem: str) -> None:
+def test_an_error_is_one_line(tmp_path: Path, content: bytes, problem: str) -> None:
     with pytest.raises(FileFormatError) as caught:
         read(tmp_path, content)
     assert str(caught.value).startswith(f"{tmp_path / 'a.json'}: {problem}")
     assert "\n" not in str(caught.value)
 
 
-def test_what_is_too_much_is_told_at_once(tmp_path: Path) -> None:
+def test_too_large_a_document_is_refused_at_once(tmp_path: Path) -> None:
     start = time.perf_counter()
     with pytest.raises(FileFormatError, match="expected at most 4000000 lists and objects"):
         read(tmp_path, b'{"a": [%s]}' % (b"[]," * MAX_CONTAINERS))
@@ -76,7 +76,7 @@ def test_what_is_too_much_is_told_at_once(tmp_path: Path) -> None:
     assert time.perf_counter() - start < 2
 
 
-def test_what_is_no_file_is_told_at_once(tmp_path: Path) -> None:
+def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="expected a readable file, got No such file"):
         read_json(tmp_path / "none.json")
     with pytest.raises(InputError, match="expected a readable file, got a folder"):
@@ -97,7 +97,7 @@ def test_the_largest_documents_are_read_in_seconds(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["NaN", "Infinity", "-Infinity", "1e999", "1" * 400])
-def test_numbers_that_are_not_finite_are_told_where_they_are(text: str) -> None:
+def test_numbers_that_are_not_finite_are_refused_with_their_place(text: str) -> None:
     with pytest.raises(DocumentError, match=r"a\[1\]: expected a finite number, found (nan|-?inf)"):
         as_array(json.loads(f"[1, {text}]"), "a", (2,))
 

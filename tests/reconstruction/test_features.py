@@ -12,10 +12,10 @@ from mien.capture.source import CapturedView
 from mien.errors import InputError
 from mien.reconstruction.features import (
     CURVE_SIGMA_MM,
-    ENOUGH_NAMED,
+    MARK_RADIUS_MM,
     MIN_CONFIDENCE,
+    MIN_NAMED_POINTS,
     POINT_SIGMA_MM,
-    WINS_WITHIN_MM,
     Features,
     gather_features,
     image_points_for_cameras,
@@ -82,7 +82,7 @@ def test_a_landmark_without_confidence_is_not_used() -> None:
     view = photographed(PERSON, FRONT, points=(), landmarks=True)
     views = [without_confidence(view, [33], MIN_CONFIDENCE / 2), view]
     features = gather_features(views, GENERIC)
-    assert features.seen[:, column(features, "landmark 33")].tolist() == [False, True]
+    assert features.observed[:, column(features, "landmark 33")].tolist() == [False, True]
     assert np.isnan(features.image_points[0, column(features, "landmark 33")]).all()
     assert "landmark 33" not in gather_features(views[:1], GENERIC).names
 
@@ -111,12 +111,12 @@ def test_marks_by_hand_silence_the_landmarks_near_them_in_that_photo() -> None:
     features = gather_features([marked, bare], GENERIC)
     places = features.on(GENERIC.mesh.vertices)
     chin = places[column(features, "chin")]
-    near = np.linalg.norm(places - chin, axis=1) < WINS_WITHIN_MM
+    near = np.linalg.norm(places - chin, axis=1) < MARK_RADIUS_MM
     landmarks = is_landmark(features)
     assert (near & landmarks).sum() > 10
-    assert not features.seen[0, near & landmarks].any()
-    assert features.seen[0, ~near].all()
-    assert features.seen[1, landmarks].all()
+    assert not features.observed[0, near & landmarks].any()
+    assert features.observed[0, ~near].all()
+    assert features.observed[1, landmarks].all()
     assert np.isnan(features.image_points[0, near & landmarks]).all()
 
 
@@ -178,10 +178,10 @@ def test_rematching_leaves_named_points_and_single_curves_alone() -> None:
 
 def test_cameras_start_without_the_curves_where_points_suffice() -> None:
     """[Pighin 2002] sec. 5.1.3: curves refine the shape; arc length would falsify the cameras."""
-    few, many = list(GENERIC.points)[:4], list(GENERIC.points)[:ENOUGH_NAMED]
+    few, many = list(GENERIC.points)[:4], list(GENERIC.points)[:MIN_NAMED_POINTS]
     views = [photographed(PERSON, FRONT, points=p, curves=["hairline"]) for p in (few, many)]
     features = gather_features(views, GENERIC)
     used = np.isfinite(image_points_for_cameras(features)).all(axis=2)
-    assert used[0].sum() == features.seen[0].sum()
-    assert used[1].sum() == ENOUGH_NAMED
-    assert features.seen[1].sum() > ENOUGH_NAMED
+    assert used[0].sum() == features.observed[0].sum()
+    assert used[1].sum() == MIN_NAMED_POINTS
+    assert features.observed[1].sum() > MIN_NAMED_POINTS

@@ -19,7 +19,7 @@ from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.similarity import estimate_similarity
 from mien.reconstruction import fit as fitting
-from mien.reconstruction.fit import ONE_SIDE, FitOptions, fit_views
+from mien.reconstruction.fit import SAME_SIDE, FitOptions, fit_views
 from mien.reconstruction.registration import NOTHING_SHARED
 from mien.reconstruction.result import NeutralFit
 from mien.reconstruction.shape.deformation import eye_centers
@@ -234,7 +234,7 @@ def test_of_photos_from_one_side_the_one_that_tells_most_gives_the_shape() -> No
     options = replace(QUICK, dense=True)
     fit = fit_views(views, GENERIC, options)
     assert list(fit.photos) == ["b"]
-    assert fit.left_out == dict.fromkeys(("a", "c"), ONE_SIDE.format("b"))
+    assert fit.left_out == dict.fromkeys(("a", "c"), SAME_SIDE.format("b"))
     alone = fit_views(views[1:2], GENERIC, options)
     np.testing.assert_array_equal(fit.vertices, alone.vertices)
     assert fit.notes == alone.notes
@@ -252,7 +252,7 @@ def test_another_side_or_another_distance_tells_depth(further: Camera) -> None:
 def test_lids_and_lips_lie_where_landmarks_show_them(monkeypatch: pytest.MonkeyPatch) -> None:
     views = views_of(FIVE[2:3], points=(), landmarks=True)
     guided = fit_views(views, GENERIC, QUICK)
-    monkeypatch.setattr(fitting, "guide_features", lambda vertices, *others, **options: vertices)
+    monkeypatch.setattr(fitting, "align_features", lambda vertices, *others, **options: vertices)
     plain = fit_views(views, GENERIC, QUICK)
     off = [
         np.median(

@@ -10,12 +10,12 @@ import pytest
 from mien.assets.generic import load_generic_head
 from mien.reconstruction.features import gather_features
 from mien.reconstruction.outliers import (
+    classify_marks,
     depth_notes,
-    find_misfit,
-    judge_marks,
+    find_outlier_photo,
+    largest_view_angle,
+    median_normalized_residuals,
     name_notes,
-    typical_misfits,
-    view_spread,
 )
 from mien.reconstruction.result import Mark, PhotoFit
 from people import camera, person, photographed
@@ -47,7 +47,7 @@ def test_names_are_doubted_when_many_marks_are_distrusted() -> None:
 
 def test_typical_misfit_is_the_median_over_what_is_seen() -> None:
     residuals = np.array([[[3.0, 4.0], [0.0, 1.0], [np.nan, np.nan]]])
-    assert typical_misfits(residuals, np.full((1, 3), 0.5)) == pytest.approx([6.0])
+    assert median_normalized_residuals(residuals, np.full((1, 3), 0.5)) == pytest.approx([6.0])
 
 
 @pytest.mark.parametrize(
@@ -63,12 +63,12 @@ def test_typical_misfit_is_the_median_over_what_is_seen() -> None:
 def test_the_worst_photo_is_left_out_only_when_it_stands_apart(
     typical: list[float], worst: int | None
 ) -> None:
-    found = find_misfit(np.array(typical))
+    found = find_outlier_photo(np.array(typical))
     assert (found and found[0]) == worst
 
 
 def test_why_a_photo_is_left_out() -> None:
-    _, why = find_misfit(np.array([1.0, 12.34, 2.0])) or (None, "")
+    _, why = find_outlier_photo(np.array([1.0, 12.34, 2.0])) or (None, "")
     assert why.startswith("its marks lie 12.3 times their expected error off the head that the oth")
     assert why.endswith("(1.5 times there)")
 
@@ -78,8 +78,8 @@ def test_the_spread_of_views_is_that_of_the_two_farthest(
     yaws: tuple[float, ...], degrees: float
 ) -> None:
     """As the head's origin sees the cameras, which look at a place 30 mm below."""
-    assert view_spread([camera(yaw) for yaw in yaws]) == pytest.approx(degrees, abs=0.3)
-    assert view_spread([camera(0, 10), camera(0, -15)]) == pytest.approx(25, abs=1.5)
+    assert largest_view_angle([camera(yaw) for yaw in yaws]) == pytest.approx(degrees, abs=0.3)
+    assert largest_view_angle([camera(0, 10), camera(0, -15)]) == pytest.approx(25, abs=1.5)
 
 
 def test_what_views_say_of_depth() -> None:
@@ -98,7 +98,7 @@ def test_a_mark_far_off_its_expected_error_gets_a_verdict(sigmas: float, verdict
     features = gather_features([view], load_generic_head())
     residuals, sigma_px = np.zeros((len(features.names), 2)), np.full(len(features.names), 2.0)
     residuals[1] = [0.6 * 2 * sigmas, -0.8 * 2 * sigmas]
-    first, second = judge_marks(features, 0, residuals, sigma_px)
+    first, second = classify_marks(features, 0, residuals, sigma_px)
     assert (first.rejection, second.rejection) == ("", verdict)
     assert second.distance_px == pytest.approx(2 * sigmas)
     assert second.by_hand

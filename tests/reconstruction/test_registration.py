@@ -14,14 +14,14 @@ from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
 from mien.reconstruction import registration
-from mien.reconstruction.dense.quality import REGIONS, Quality
+from mien.reconstruction.dense.quality import REGIONS, RegistrationQuality
 from mien.reconstruction.dense.register import Registration
 from mien.reconstruction.features import EDGE_SIGMA_MM, gather_features
 from mien.reconstruction.landmark_fit import Solution, residuals_of
 from mien.reconstruction.registration import (
-    CONTRADICTED,
-    MOST_MISFIT,
-    NOT_PLACED,
+    INCONSISTENT_REGISTRATION,
+    MAX_EDGE_RESIDUAL,
+    NOT_LOCALIZED,
     NOTHING_SHARED,
     register_solution,
 )
@@ -63,7 +63,7 @@ def test_a_profile_is_placed_and_a_landscape_is_not(start: Solution) -> None:
     landscape = faceless(clutter(448, 384, 9), "landscape.png")
     found = register_solution(start, [profile, landscape], GENERIC)
     assert [view.photo.name for view in found.views] == ["0.png", "1.png", "2.png", "profile.png"]
-    assert found.problems == {"landscape.png": NOT_PLACED}
+    assert found.problems == {"landscape.png": NOT_LOCALIZED}
     turn = found.cameras[3].R_cam_head @ found.cameras[1].R_cam_head.T
     true = at(55).R_cam_head @ start.cameras[1].R_cam_head.T
     assert np.degrees(angle_between(turn, true)) < 0.5
@@ -99,9 +99,9 @@ def test_a_failure_is_told_and_loses_nothing(
 def registered_beside(start: Solution, mm: float) -> Registration:
     """The true head with true cameras, all of it so much to its left."""
     nothing = np.zeros(len(start.views))
-    quality = Quality(
+    quality = RegistrationQuality(
         shared=np.full(len(nothing), 1000),
-        disagreeing=np.full((len(nothing), len(REGIONS)), np.nan),
+        outlier_fraction=np.full((len(nothing), len(REGIONS)), np.nan),
         turn_sd=nothing,
         rms_px=nothing,
     )
@@ -119,11 +119,11 @@ def test_a_head_that_the_landmarks_contradict_is_refused(
     features = gather_features(views, GENERIC)
     residuals = residuals_of(features, cameras, NEUTRAL)
     start = Solution(views, features, tuple(cameras), NEUTRAL, residuals, np.ones(len(NEUTRAL)), {})
-    found = registered_beside(start, share * MOST_MISFIT * EDGE_SIGMA_MM)
+    found = registered_beside(start, share * MAX_EDGE_RESIDUAL * EDGE_SIGMA_MM)
     monkeypatch.setattr(registration, "register_views", lambda *known, **options: found)
     result = register_solution(start, [], GENERIC)
     if share > 1:
-        assert result.notes == (CONTRADICTED,)
+        assert result.notes == (INCONSISTENT_REGISTRATION,)
         assert result.matches == ()
         np.testing.assert_array_equal(result.vertices, start.vertices)
         assert (result.uncertainty_mm > found.deviation_mm).all()

@@ -8,24 +8,26 @@ import numpy as np
 import pytest
 
 from mien.errors import InputError
-from mien.reconstruction.triangulation import intersect_rays
+from mien.reconstruction.triangulation import triangulate
 
 
 def test_exact_rays_meet_at_the_points(make_scene):
     scene = make_scene(0)
-    found = intersect_rays(scene.cameras, scene.image_points)
+    found = triangulate(scene.cameras, scene.image_points)
     views = np.isfinite(scene.image_points[..., 0]).sum(axis=0)
     np.testing.assert_array_equal(found.views, views)
-    np.testing.assert_array_equal(found.solved, views >= 2)
-    np.testing.assert_allclose(found.points[found.solved], scene.points[found.solved], atol=1e-8)
-    assert np.isnan(found.points[~found.solved]).all()
-    assert np.nanmax(found.residual_mm[found.solved]) < 1e-8
+    np.testing.assert_array_equal(found.determined, views >= 2)
+    np.testing.assert_allclose(
+        found.points[found.determined], scene.points[found.determined], atol=1e-8
+    )
+    assert np.isnan(found.points[~found.determined]).all()
+    assert np.nanmax(found.residual_mm[found.determined]) < 1e-8
 
 
 def test_no_other_place_is_nearer_to_the_rays(make_scene, rng):
     scene = make_scene(0, noise=3.0, hidden=False)
     weights = rng.uniform(0.1, 1, scene.image_points.shape[:2])
-    found = intersect_rays(scene.cameras, scene.image_points, weights=weights)
+    found = triangulate(scene.cameras, scene.image_points, weights=weights)
 
     def cost(points):
         total = 0.0
@@ -46,19 +48,19 @@ def test_angle_is_the_largest_between_two_rays(make_scene):
     rays = np.stack([point - camera.center for camera in scene.cameras])
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     expected = np.arccos(np.clip(rays @ rays.T, -1, 1)).max()
-    assert intersect_rays(scene.cameras, scene.image_points).angle[0] == pytest.approx(expected)
+    assert triangulate(scene.cameras, scene.image_points).angle[0] == pytest.approx(expected)
 
 
 def test_one_ray_gives_nothing_or_the_nearest_place_on_it(make_scene):
     scene = make_scene(0, hidden=False)
     scene.image_points[1:, 0] = np.nan
-    alone = intersect_rays(scene.cameras, scene.image_points)
-    assert not alone.solved[0]
+    alone = triangulate(scene.cameras, scene.image_points)
+    assert not alone.determined[0]
     assert np.isnan(alone.points[0]).all()
     assert alone.angle[0] == 0
     current = scene.points + np.array([3.0, -2.0, 1.0])
-    pulled = intersect_rays(scene.cameras, scene.image_points, current=current)
-    assert not pulled.solved[0]
+    pulled = triangulate(scene.cameras, scene.image_points, current=current)
+    assert not pulled.determined[0]
     direction = scene.cameras[0].ray_directions(scene.image_points[0, :1])[0]
     center = scene.cameras[0].center
     nearest = center + direction * (direction @ (current[0] - center))
@@ -72,18 +74,18 @@ def test_nearly_parallel_rays_do_not_tell_depth(make_scene, rng):
     points = make_scene(0).points
     image_points = np.stack([camera.project(points), beside.project(points)])
     image_points += 2 * rng.normal(size=image_points.shape)
-    found = intersect_rays([camera, beside], image_points)
-    assert not found.solved.any()
+    found = triangulate([camera, beside], image_points)
+    assert not found.determined.any()
     assert np.isnan(found.points).all()
-    pulled = intersect_rays([camera, beside], image_points, current=points)
+    pulled = triangulate([camera, beside], image_points, current=points)
     assert np.linalg.norm(pulled.points - points, axis=1).max() < 2
 
 
 def test_a_point_that_nobody_sees_stays(make_scene):
     scene = make_scene(0)
     scene.image_points[:, 2] = np.nan
-    assert np.isnan(intersect_rays(scene.cameras, scene.image_points).points[2]).all()
-    pulled = intersect_rays(scene.cameras, scene.image_points, current=scene.generic)
+    assert np.isnan(triangulate(scene.cameras, scene.image_points).points[2]).all()
+    pulled = triangulate(scene.cameras, scene.image_points, current=scene.generic)
     np.testing.assert_allclose(pulled.points[2], scene.generic[2], atol=1e-9)
     assert np.isnan(pulled.residual_mm[2])
     assert pulled.views[2] == 0
@@ -104,4 +106,4 @@ def test_refuses_bad_input(make_scene, change, message):
     scene = make_scene(0)
     given = {"cameras": scene.cameras, "image_points": scene.image_points}
     with pytest.raises(InputError, match=message):
-        intersect_rays(**{**given, **change})
+        triangulate(**{**given, **change})

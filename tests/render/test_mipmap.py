@@ -43,7 +43,7 @@ def test_a_texels_middle_has_its_colour_and_between_them_they_mix(
         np.testing.assert_allclose(found, expected, atol=0.1)
 
 
-def test_u_goes_around_and_v_ends(rng: np.random.Generator) -> None:
+def test_u_is_periodic_and_v_is_clamped(rng: np.random.Generator) -> None:
     texture = noise(rng)
     pyramids = build_pyramids([texture])
     seam = (texture[4, 63].astype(float) + texture[4, 0]) / 2

@@ -80,7 +80,7 @@ def bilinear(texture: Array, uv: Array) -> Array:
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 0.4), (-0.5, 1.5)])
 @pytest.mark.parametrize("samples", [1, 4, 9])
-def test_one_pass_shows_what_passes_added_up_show(
+def test_one_pass_equals_the_sum_of_passes(
     rng: np.random.Generator, low: float, high: float, samples: int
 ) -> None:
     brightness = np.clip(1.1 - MESH.vertices[:, 1] / 150, 0.4, 1.3)

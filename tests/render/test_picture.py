@@ -178,7 +178,7 @@ def test_units_do_not_change_the_framing(head: Head, used: list[Camera]) -> None
         (FaceState({FACE: {"awe": -0.6}}), "weight of awe: expected -0.5 to 1.5, got -0.6"),
     ],
 )
-def test_what_a_head_cannot_do(head: Head, state: FaceState, message: str) -> None:
+def test_bad_states_are_refused(head: Head, state: FaceState, message: str) -> None:
     with pytest.raises(InputError, match=message):
         render_head(head, state=state)
 

@@ -6,7 +6,7 @@ import pytest
 from mien.errors import InputError
 from mien.mesh import Mesh
 from mien.render.mipmap import build_pyramids
-from mien.render.mix import prepare_painted
+from mien.render.multitexture import prepare_textured_mesh
 from mien.render.shade import CLAY, Light, over_background, render
 from shapes import RADII, camera_at, ellipsoid, smooth_texture, with_nose
 
@@ -96,7 +96,7 @@ def test_backgrounds() -> None:
         over_background(half, behind[:10])
 
 
-def test_fine_textures_seen_small_become_their_mean() -> None:
+def test_minified_textures_become_their_mean() -> None:
     mesh = ellipsoid()
     checks = (np.indices((1024, 2048)).sum(axis=0) % 2 * 255).astype(np.uint8)
     texture = np.repeat(checks[..., None], 3, axis=2)
@@ -120,7 +120,7 @@ def test_bad_input_is_refused() -> None:
     with pytest.raises(InputError, match="samples: expected 1 or 4 or 9, got 2"):
         render(mesh, camera, samples=2)
     with pytest.raises(InputError, match="mesh: expected one with texture coordinates"):
-        prepare_painted(bare, build_pyramids([texture]))
+        prepare_textured_mesh(bare, build_pyramids([texture]))
     with pytest.raises(InputError, match="vertex_colours: expected only one of them"):
         render(mesh, camera, texture, vertex_colours=np.zeros(mesh.vertices.shape))
     with pytest.raises(InputError, match=r"vertex_colours: expected shape \(3321, 3\)"):

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from mien.assets.generic import load_generic_head
+from mien.camera import head_angles_deg
 from mien.head import Expression, FittedView, Head
 from mien.reconstruction.fit import FitOptions, fit_views
 from mien.reconstruction.result import Mark, NeutralFit, PhotoFit
 from mien.render.orbit import orbit_camera
 from mien.report import ReportInput, render_report
-from mien.report.page import head_angles_deg
 from people import camera, person, photographed
 
 GENERIC = load_generic_head()

@@ -11,7 +11,7 @@ from mien.arrays import Array
 from mien.assets.generic import load_generic_head
 from mien.capture.source import load_capture
 from mien.pipelines.demo import demo_photos
-from mien.reconstruction.dense.eyes import seat_eyes
+from mien.reconstruction.dense.eyeballs import fit_eyeballs
 from mien.reconstruction.fit import FitOptions, fit_views
 from mien.rig.deformer import FaceDeformer, fit_units
 from mien.rig.unit_transfer import transfer_units
@@ -64,7 +64,7 @@ def rigged(request: pytest.FixtureRequest) -> Rigged:
     if request.param == "James":
         views = load_capture(demo_photos()).expressions["neutral"]
         fit = fit_views(views, generic, FitOptions(dense=False))
-        vertices = seat_eyes(np.array(fit.vertices), generic)
+        vertices = fit_eyeballs(np.array(fit.vertices), generic)
     elif request.param != "generic":
         seed = int(request.param[-1])
         bumps = np.random.default_rng(seed).normal(size=(8, 2, 3))

@@ -160,7 +160,7 @@ def test_the_hulls_border_is_inside() -> None:
     assert outside_hull([[0.5, 0.5], [0.2, 0.8]], ["neutral", "joy"]) is None
 
 
-def test_beyond_the_hull_says_who_and_how_far() -> None:
+def test_beyond_the_hull_names_expressions_and_weights() -> None:
     frames = [[0.5, 0.5, 0.0], [-0.1, 1.1, 0.0], [-0.25, 1.25, 0.0]]
     warning = outside_hull(frames, ["neutral", "joy", "anger"])
     assert warning is not None

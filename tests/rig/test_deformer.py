@@ -41,7 +41,7 @@ def test_a_mouth_closes_only_as_far_as_the_jaw_is_open(rigged: Rigged) -> None:
     )
 
 
-def test_what_is_taken_over_is_said() -> None:
+def test_nonlinear_units_are_listed() -> None:
     assert set(FaceDeformer.nonlinear_units) == {*EYE_LOOK_UNITS, "mouthClose"}
     assert set(FaceDeformer.nonlinear_units) <= set(GENERIC.unit_names)
 
@@ -57,7 +57,7 @@ def test_lashes_go_with_the_lid(rigged: Rigged) -> None:
     assert (moved[followers.vertices[lashes]] >= skin.min(axis=1) - 1e-9).all()
 
 
-def test_followers_that_nothing_carries_are_left_out(rigged: Rigged) -> None:
+def test_followers_of_other_skin_are_left_out(rigged: Rigged) -> None:
     contacts = rigged.deformer.contacts
     touching = [*contacts.lids, contacts.lips.upper, contacts.lips.lower]
     moves = np.zeros_like(rigged.neutral)

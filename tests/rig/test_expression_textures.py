@@ -106,7 +106,7 @@ def rightly_shown(name: str, part: str) -> Array:
 
 
 @pytest.mark.parametrize("part", ["left_eyeball", "right_eyeball"])
-def test_eyes_that_only_neutral_shows_serve_a_face_asleep(part: str) -> None:
+def test_eyes_only_in_neutral_are_used_for_closed_eyes(part: str) -> None:
     """As dark as they are behind closing lids."""
     shown = rightly_shown("neutral", part)
     assert shown.sum() > 100
@@ -117,7 +117,7 @@ def test_eyes_that_only_neutral_shows_serve_a_face_asleep(part: str) -> None:
 
 @pytest.mark.parametrize("part", ["upper_teeth", "lower_teeth"])
 @pytest.mark.parametrize("other", ["neutral", "asleep"])
-def test_teeth_that_only_an_open_mouth_shows_serve_the_others(part: str, other: str) -> None:
+def test_teeth_only_in_an_open_mouth_are_used_for_the_others(part: str, other: str) -> None:
     """As dark as they are behind lips that hardly part."""
     shown = rightly_shown("awe", part)
     assert shown.sum() > 100
@@ -131,7 +131,7 @@ def test_skin_is_that_of_the_photos(name: str) -> None:
     assert np.percentile(off(name, texels("skin")), 99) <= 3
 
 
-def test_without_two_photos_of_one_part_shading_is_the_usual() -> None:
+def test_without_two_photos_of_one_part_shading_is_the_default() -> None:
     """Only one of these shows teeth, and eyes at rest are as open as eyes in awe."""
     for part, polynomial in looks().shading.items():
         np.testing.assert_allclose(polynomial, SHADING[part], atol=0.02)

@@ -86,7 +86,7 @@ def test_no_border_runs_through_lips_nostrils_or_lids(region: str, names: tuple[
 @pytest.mark.parametrize(
     ("region", "behind"), [("mouth", "lips"), ("mouth", "mouth_cavity"), ("eyes", "eye_socket")]
 )
-def test_what_lies_behind_lips_and_lids_goes_with_them(region: str, behind: str) -> None:
+def test_surfaces_behind_lips_and_lids_belong_to_their_regions(region: str, behind: str) -> None:
     for name, mask in WHOLE.items():
         np.testing.assert_allclose(mask[skin_of(behind)], name == region, atol=0.05)
 
@@ -109,7 +109,7 @@ def test_each_eyeball_belongs_to_its_side() -> None:
         np.testing.assert_allclose(DEFAULT[f"{side}_eye"][ball], 1)
 
 
-def test_every_region_lies_in_those_around_it() -> None:
+def test_every_region_lies_in_those_that_contain_it() -> None:
     assert set(MASK_NAMES) <= set(ENCLOSING_REGIONS)
     for region, around in ENCLOSING_REGIONS.items():
         assert region == "face" or around[-1] == "face"
@@ -142,6 +142,6 @@ def test_masks_that_fit_stay_as_they_are() -> None:
         ({"left_eye": np.full(4, np.nan)}, "region left_eye: expected finite"),
     ],
 )
-def test_masks_that_are_none(masks: dict[str, Array], message: str) -> None:
+def test_bad_masks_are_refused(masks: dict[str, Array], message: str) -> None:
     with pytest.raises(InputError, match=message):
         check_masks(masks, 4)

@@ -59,7 +59,7 @@ def test_weight_one_is_that_very_expression(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_weight_one_looks_like_that_expression_by_itself(name: str) -> None:
+def test_weight_one_renders_that_expression(name: str) -> None:
     known, camera = head(), at(15, 5)
     face = RIG.evaluate(showing(**{name: 1.0}))
     drawn = MorphRenderer(known.mesh, RIG.textures).render(face, camera)
@@ -188,7 +188,7 @@ def test_contacts_concern_lids_and_lips_alone() -> None:
 
 
 @pytest.mark.parametrize("name", ["joy", "anger", "awe"])
-def test_the_units_of_an_expression_bring_it_along(name: str) -> None:
+def test_residuals_follow_the_units_of_their_expression(name: str) -> None:
     """Its residual and its texture, wherever its units have a say; a sparing share is missing."""
     face = posed(FaceState(units=UNITS[name]))
     residual = SHAPES[name] - explained_by(UNITS[name])
@@ -207,14 +207,14 @@ def test_the_units_of_an_expression_bring_it_along(name: str) -> None:
     assert lengths[there].max() > 1
 
 
-def test_half_the_units_bring_half_of_it_along() -> None:
+def test_half_the_units_add_half_the_residual() -> None:
     half = {unit: 0.5 * weight for unit, weight in UNITS["awe"].items()}
     face = posed(FaceState(units=half))
     lower = MASKS["left_mouth"] + MASKS["right_mouth"] > 1 - 1e-9
     np.testing.assert_allclose(face.weights[lower, NAMES.index("awe")], 0.5, atol=0.01)
 
 
-def test_what_a_photograph_shows_already_does_not_come_along_twice() -> None:
+def test_residuals_are_not_added_to_their_own_expression() -> None:
     face = posed(FaceState({"face": {"awe": 1.0}}, UNITS["awe"]))
     np.testing.assert_allclose(face.weights, np.tile(only("awe"), (len(REST), 1)), atol=1e-12)
     expected = SHAPES["awe"] + explained_by(UNITS["awe"]) - REST
@@ -235,7 +235,7 @@ def test_eyes_turn_by_the_weight_of_the_expressions_gaze(weight: float) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES[1:])
-def test_nothing_jumps_on_the_way_to_an_expression(name: str) -> None:
+def test_the_way_to_an_expression_is_continuous(name: str) -> None:
     before, there = (posed(showing(**{name: weight})) for weight in (1 - 1e-6, 1.0))
     np.testing.assert_allclose(before.vertices, there.vertices, rtol=0, atol=1e-4)
 
@@ -258,7 +258,7 @@ def test_eyes_of_an_expression_turn_on_when_a_unit_turns_them() -> None:
     np.testing.assert_allclose(face.vertices[eyeball.vertices], expected, atol=1e-6)
 
 
-def test_numbers_make_the_face_of_the_state_that_they_stand_for() -> None:
+def test_arrays_and_states_give_the_same_face() -> None:
     state = FaceState({"mouth": {"awe": 0.6}, "face": {"joy": 0.3}}, {"jawOpen": 0.4}, Gaze(0.2))
     mouth, rest = [0.4, 0, 0, 0.6], [0.7, 0.3, 0, 0]
     rows = region_rows(("mouth", "face"))
@@ -270,7 +270,7 @@ def test_numbers_make_the_face_of_the_state_that_they_stand_for() -> None:
         np.testing.assert_allclose(getattr(numbers, field), getattr(face, field), atol=1e-9)
 
 
-def test_regions_obey_the_nearest_around_them() -> None:
+def test_regions_take_the_nearest_given_weights() -> None:
     given = ("eyes", "left_mouth", "forehead")
     assert WEIGHTED_REGIONS[-1] == "face"
     np.testing.assert_array_equal(region_rows(given), [2, 0, 1, 1, 3, 3, 0])
@@ -291,7 +291,7 @@ def test_eyes_darken_as_their_lids_close() -> None:
         np.testing.assert_array_equal(face.brightness[part_vertices(GENERIC, "skin")], 1)
 
 
-def test_teeth_come_to_light_as_the_mouth_opens() -> None:
+def test_teeth_get_brighter_as_the_mouth_opens() -> None:
     teeth = part_vertices(GENERIC, "upper_teeth", "lower_teeth", "tongue")
     faces = [RIG.evaluate(FaceState(units={"jawOpen": w})) for w in (0, 0.1, 0.3)]
     light = [face.brightness[teeth[0]] for face in faces]
@@ -300,7 +300,7 @@ def test_teeth_come_to_light_as_the_mouth_opens() -> None:
     assert all(np.ptp(face.brightness[teeth]) == 0 for face in faces)
 
 
-def test_notes_name_what_goes_past_the_photographs() -> None:
+def test_notes_name_extrapolated_expressions() -> None:
     assert RIG.hull_notes(showing(joy=0.7, awe=0.3)) == ()
     (note,) = RIG.hull_notes(FaceState({"face": {"joy": 1.0}, "mouth": {"awe": 1.2}}))
     assert note.startswith("mouth: past what was photographed")
@@ -323,7 +323,7 @@ def test_notes_name_what_goes_past_the_photographs() -> None:
         (FaceState(units={"jawOpen": np.inf}), "unit jawOpen: expected -0.5 to 1.5, got inf"),
     ],
 )
-def test_states_that_the_head_cannot_be_in(state: FaceState, message: str) -> None:
+def test_bad_states_are_refused(state: FaceState, message: str) -> None:
     with pytest.raises(InputError, match=message):
         RIG.evaluate(state)
     if state.expressions and "muoth" not in state.expressions:
@@ -336,7 +336,7 @@ def test_the_limits_themselves_are_allowed() -> None:
         assert np.isfinite(RIG.evaluate(state).vertices).all()
 
 
-def test_heads_that_cannot_be_moved() -> None:
+def test_bad_heads_are_refused() -> None:
     corner = Mesh(np.eye(3), np.array([[0, 1, 2]]))
     other = Head("Nobody", corner, {"neutral": Expression(np.eye(3))}, np.ones(3))
     with pytest.raises(InputError, match="head: expected the generic head's 5474 vertices, got 3"):
@@ -349,7 +349,7 @@ def test_heads_that_cannot_be_moved() -> None:
         Rig(head_of(textures=textures))
 
 
-def test_an_expression_without_a_texture_wears_neutrals() -> None:
+def test_an_expression_without_a_texture_has_that_of_neutral() -> None:
     textures = {name: pixels for name, pixels in head().textures.items() if name != "awe"}
     rig = Rig(head_of(textures=textures))
     np.testing.assert_array_equal(rig.textures[3], rig.textures[0])
@@ -385,7 +385,7 @@ def test_every_vertex_may_have_weights_of_its_own() -> None:
     np.testing.assert_array_equal(face.weights, weights)
 
 
-def test_offsets_move_the_mixed_face_on(rng: np.random.Generator) -> None:
+def test_offsets_are_added_to_the_mixed_face(rng: np.random.Generator) -> None:
     weights = np.tile(np.eye(4)[1], (len(REST), 1))
     offsets = rng.normal(size=REST.shape)
     face = RIG.mixed(weights, offsets, contacts=False)
@@ -400,7 +400,7 @@ def test_bad_weights_by_vertex_are_refused() -> None:
         RIG.mixed(np.tile(np.eye(4)[1], (len(REST), 1)), np.zeros((3, 3)))
 
 
-def test_eyes_turn_on_from_where_the_mixture_looks() -> None:
+def test_turns_are_added_to_the_gaze_of_the_mixture() -> None:
     turn = np.array([[0.2, 0.05], [0.1, 0.0]])
     face = RIG.mixed(np.tile(only("joy"), (len(REST), 1)), turn=turn, contacts=False)
     expected = with_turned_eyes(SHAPES["joy"], turn, GENERIC)

@@ -53,12 +53,12 @@ def test_lids_at_rest_leave_eyes_as_they_are() -> None:
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_without_photos_to_compare_the_usual_polynomial(part: str) -> None:
+def test_without_pairs_of_photos_the_default_polynomial(part: str) -> None:
     np.testing.assert_allclose(fit_polynomial(part, []), SHADING[part], rtol=1e-9)
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_photos_tell_the_persons_own(part: str) -> None:
+def test_many_pairs_recover_the_persons_polynomial(part: str) -> None:
     openings = openings_of(part, 12)
     truth = value(known(part), openings)
     measured = ratios(known(part), openings) * 8
@@ -71,7 +71,7 @@ def test_photos_tell_the_persons_own(part: str) -> None:
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_one_pair_of_photos_goes_part_of_the_way(part: str) -> None:
+def test_one_pair_of_photos_is_balanced_with_the_prior(part: str) -> None:
     first = ratios(known(part), openings_of(part, 12))[2]
     found = fit_polynomial(part, [first])
     ratio = [
@@ -83,7 +83,7 @@ def test_one_pair_of_photos_goes_part_of_the_way(part: str) -> None:
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_the_usual_ratios_change_nothing(part: str) -> None:
+def test_ratios_of_the_default_keep_the_default(part: str) -> None:
     measured = ratios(SHADING[part], openings_of(part, 6))
     np.testing.assert_allclose(fit_polynomial(part, measured), SHADING[part], atol=1e-9)
 

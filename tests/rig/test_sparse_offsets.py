@@ -32,7 +32,7 @@ def test_only_what_moves_is_kept(rng: np.random.Generator) -> None:
     assert len(SparseOffsets.of(np.zeros((0, 30, 3))).vertices) == 0
 
 
-def test_every_vertex_mixes_its_own_way(rng: np.random.Generator) -> None:
+def test_mixtures_with_weights_for_every_vertex(rng: np.random.Generator) -> None:
     offsets, weights = rng.normal(size=(3, 30, 3)), rng.normal(size=(30, 4))
     start = rng.normal(size=(30, 3))
     moved = start.copy()

@@ -7,7 +7,7 @@ from mien.errors import InputError
 from mien.rig.state import FaceState, Gaze, PosedFace
 
 
-def test_a_face_does_nothing_unless_told() -> None:
+def test_the_default_state_is_neutral() -> None:
     state = FaceState()
     assert not state.expressions
     assert not state.units
@@ -15,7 +15,7 @@ def test_a_face_does_nothing_unless_told() -> None:
 
 
 @pytest.mark.parametrize("angles", [(np.nan, 0.0), (0.0, np.inf)])
-def test_eyes_look_somewhere(angles: tuple[float, float]) -> None:
+def test_gaze_is_finite(angles: tuple[float, float]) -> None:
     with pytest.raises(InputError, match="gaze"):
         Gaze(*angles)
 
@@ -42,7 +42,7 @@ def test_arrays_that_do_not_fit(name: str, arrays: tuple[np.ndarray, ...]) -> No
         PosedFace(*arrays)
 
 
-def test_numbers_need_not_be_looked_at() -> None:
+def test_the_check_for_finite_numbers_is_optional() -> None:
     unknown = np.full((4, 3), np.nan)
     face = PosedFace(unknown, np.ones((4, 1)), np.ones(4), finite=False)
     assert np.isnan(face.vertices).all()

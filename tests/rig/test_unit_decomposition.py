@@ -43,13 +43,13 @@ def cost(region: int, asked: Array, shares: Array) -> float:
     return float(((shares @ known - wanted) ** 2).sum() + RIDGE**2 * (shares**2).sum())
 
 
-def test_what_the_units_do_not_explain_is_left_over() -> None:
+def test_residuals_are_what_the_units_do_not_explain() -> None:
     rebuilt = np.tensordot(WEIGHTS, units(), axes=1) + KNOWN.residuals
     np.testing.assert_allclose(rebuilt[1:], offsets()[1:], atol=1e-12)
     assert not KNOWN.residuals[0].any()
 
 
-def test_units_concern_the_regions_that_they_move_and_the_rest() -> None:
+def test_units_belong_to_the_regions_that_they_move_and_the_rest() -> None:
     left, right, rest = KNOWN.by_region
     np.testing.assert_array_equal(left, WEIGHTS * [1, 0, 1, 1])
     np.testing.assert_array_equal(right, WEIGHTS * [0, 1, 1, 1])
@@ -57,7 +57,7 @@ def test_units_concern_the_regions_that_they_move_and_the_rest() -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_shares_are_the_optimum(seed: int) -> None:
+def test_the_weights_are_the_optimum(seed: int) -> None:
     """No feasible nudge is better: one more or less, one for another, or any."""
     rng = np.random.default_rng(seed)
     asked = rng.uniform(-0.3, 1.2, 4)
@@ -74,12 +74,12 @@ def test_the_shares_are_the_optimum(seed: int) -> None:
             assert cost(region, asked, other * used) >= best - 1e-4
 
 
-def test_no_units_bring_nothing() -> None:
+def test_zero_units_give_zero_weights() -> None:
     np.testing.assert_array_equal(KNOWN.expression_weights(np.zeros(4)), np.zeros((3, 3)))
 
 
 @pytest.mark.parametrize("weight", [-1.0, 0.3, 1.0])
-def test_a_unit_that_no_expression_has_brings_nothing(weight: float) -> None:
+def test_a_unit_that_no_expression_has_gives_zero_weights(weight: float) -> None:
     np.testing.assert_array_equal(
         KNOWN.expression_weights(weight * np.eye(4)[NOWHERE]), np.zeros((3, 3))
     )
@@ -88,12 +88,12 @@ def test_a_unit_that_no_expression_has_brings_nothing(weight: float) -> None:
     np.testing.assert_allclose(with_it, KNOWN.expression_weights(asked), atol=1e-9)
 
 
-def test_the_opposite_of_an_expression_brings_nothing() -> None:
+def test_the_opposite_of_an_expression_gives_zero_weights() -> None:
     assert KNOWN.expression_weights(-WEIGHTS[1]).max() < 1e-6
 
 
 @pytest.mark.parametrize("expression", [1, 2])
-def test_the_units_of_an_expression_bring_it(expression: int) -> None:
+def test_the_units_of_an_expression_give_its_weight(expression: int) -> None:
     """In the rest of the head, which all units concern; a sparing share is missing."""
     rest = KNOWN.expression_weights(WEIGHTS[expression])[2]
     np.testing.assert_allclose(rest, np.eye(3)[expression - 1], atol=0.02)
@@ -101,17 +101,17 @@ def test_the_units_of_an_expression_bring_it(expression: int) -> None:
     np.testing.assert_allclose(half, 0.5 * np.eye(3)[expression - 1], atol=0.02)
 
 
-def test_units_past_an_expression_bring_no_more_than_all_of_it() -> None:
+def test_weights_sum_to_at_most_one() -> None:
     for shares in KNOWN.expression_weights(3 * WEIGHTS[3]):
         assert shares.sum() == pytest.approx(1, abs=1e-3)
 
 
-def test_a_side_has_shares_of_its_own() -> None:
+def test_each_side_has_its_own_weights() -> None:
     shares = KNOWN.expression_weights(np.array([0.0, 0.9, 0.0, 0.0]))
     assert not shares[0].any()
     assert shares[1].max() > 0.9
 
 
-def test_neutral_alone_brings_nothing() -> None:
+def test_neutral_alone_has_no_weights() -> None:
     alone = UnitDecomposition.of(WEIGHTS[:1], units(), offsets()[:1] * 0, MASKS)
     assert alone.expression_weights(np.ones(4)).shape == (3, 0)

@@ -31,7 +31,7 @@ def test_the_size_of_a_texel() -> None:
     assert atlas_surface(mesh, width=100, height=100).texel_mm == pytest.approx(0.5, rel=1e-4)
 
 
-def test_parts_are_told_apart() -> None:
+def test_mask_of_a_part() -> None:
     mesh = with_nose(ellipsoid())
     surface = atlas_surface(mesh, width=200, height=100)
     nose = part_mask(surface, mesh, "nose", "no such part")

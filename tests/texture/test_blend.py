@@ -33,7 +33,7 @@ def test_colours_are_the_convex_combination_by_visibility_times_certainty(power:
     assert not blend.colours[blend.coverage == 0].any()
 
 
-def test_grazing_views_are_not_trusted_by_themselves() -> None:
+def test_grazing_views_have_low_confidence() -> None:
     mesh = ellipsoid()
     surface = atlas_surface(mesh, width=80, height=60)
     view = prepare_view(mesh, camera_at(0, mesh), np.full((320, 320, 3), 99, np.uint8))

@@ -73,7 +73,7 @@ def off(texture: Array, true: Array) -> Array:
     return np.abs(texture.astype(int) - true).max(axis=2)
 
 
-def test_the_texture_is_the_expressions_where_it_is_seen(found: TextureLayer) -> None:
+def test_visible_texels_show_the_expression(found: TextureLayer) -> None:
     texture = found.over(resting(), SURFACE)
     sure = found.opacity > 0.99
     assert sure[110:150, 236:276].all(), "the patch is in the middle of the face"
@@ -83,7 +83,7 @@ def test_the_texture_is_the_expressions_where_it_is_seen(found: TextureLayer) ->
     assert sure.mean() > 0.15
 
 
-def test_what_no_photo_shows_is_neutrals(found: TextureLayer) -> None:
+def test_holes_show_neutral(found: TextureLayer) -> None:
     texture = found.over(resting(), SURFACE)
     away = FRONT.center - SURFACE.points
     back = (SURFACE.normals * away).sum(axis=2) < 0
@@ -103,7 +103,7 @@ def test_the_two_textures_meet_in_a_ramp(found: TextureLayer) -> None:
     assert np.abs(np.diff(row)).max() < 0.2
 
 
-def test_where_nothing_may_differ_the_texture_is_neutrals() -> None:
+def test_outside_the_mask_the_texture_is_neutral() -> None:
     within = np.clip(0.5 + MESH.vertices[:, 1] / 20, 0, 1)
     part = look([photo(wrinkled())], within=within)
     mask = interpolate_vertex_values(SURFACE, MESH, within[:, None])[..., 0]
@@ -114,7 +114,7 @@ def test_where_nothing_may_differ_the_texture_is_neutrals() -> None:
     np.testing.assert_allclose(part.opacity, whole.opacity * mask, atol=1e-6)
 
 
-def test_what_is_behind_the_lips_is_seen_through_slits(found: TextureLayer) -> None:
+def test_surfaces_behind_the_lips_are_visible_through_slits(found: TextureLayer) -> None:
     """A wide ramp would leave nothing of it."""
     slit = look([photo(wrinkled())], inside=EVERYWHERE)
     assert (slit.opacity > 0.99).sum() > 1.2 * (found.opacity > 0.99).sum()
@@ -132,7 +132,7 @@ def test_exposure_and_white_balance_are_neutrals(exposure: tuple[float, ...]) ->
     assert np.median(off(texture, wrinkled())[sure]) <= 2
 
 
-def test_exposures_differ_by_so_much_at_most() -> None:
+def test_gains_are_limited() -> None:
     """A photo in the dark is no photo of a face in the light."""
     dark = look([photo(wrinkled(), exposure=0.3)])
     np.testing.assert_allclose(dark.gains, 1.6)
@@ -160,7 +160,7 @@ def test_photos_of_unlike_exposure_agree() -> None:
     assert sure.mean() > 0.3
 
 
-def test_eyes_are_seen_for_themselves() -> None:
+def test_eyes_are_textured_separately() -> None:
     """A ball before the face that is the photo's, whatever is behind it."""
     mesh = replace(with_nose(MESH), part_names=("skin", "left_eyeball"))
     surface = atlas_surface(mesh, width=SIZE[0], height=SIZE[1])
@@ -186,7 +186,7 @@ def made_up(tone: int, share: Array) -> TextureLayer:
     return TextureLayer(colours, share, (share > 0).astype(np.float32), np.ones((1, 3)))
 
 
-def test_colours_count_by_their_share(rng: np.random.Generator) -> None:
+def test_layers_are_composited_by_opacity(rng: np.random.Generator) -> None:
     share = rng.uniform(0, 1, size=(SIZE[1], SIZE[0])).astype(np.float32)
     below = rng.integers(0, 256, size=(SIZE[1], SIZE[0], 3), dtype=np.uint8)
     mixed = made_up(200, share).over(below, SURFACE)
@@ -197,7 +197,7 @@ def test_colours_count_by_their_share(rng: np.random.Generator) -> None:
     )
 
 
-def test_looks_beside_each_other_are_both() -> None:
+def test_layers_are_merged() -> None:
     shape = SIZE[1], SIZE[0]
     left, right = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     left[:, :300], right[:, 200:] = 1, 1

@@ -44,7 +44,7 @@ def psnr(one: Array, other: Array) -> float:
 
 
 @pytest.mark.parametrize("layout", ["atlas", "cylinder"])
-def test_a_new_view_looks_as_it_should(
+def test_a_new_view_matches_the_ground_truth(
     mesh: Mesh, cameras: list[Camera], photos: list[Array], layout: str
 ) -> None:
     # Photos at -50, 0 and 50 degrees, a new view at 25. Rounding to 8 bits three times (photo,
@@ -91,7 +91,7 @@ def test_ends_of_the_cylinder_agree(mesh: Mesh, cameras: list[Camera], photos: l
     assert np.abs(pixels[:, 0] - pixels[:, -1]).max() <= 4
 
 
-def test_exposure_and_white_balance_are_evened_out(mesh: Mesh, cameras: list[Camera]) -> None:
+def test_exposure_and_white_balance_are_equalized(mesh: Mesh, cameras: list[Camera]) -> None:
     gains = np.array([[0.8, 0.9, 0.85], [1, 1, 1], [1.1, 1.15, 1.25]])
     truth = smooth_texture() // 2 + 40
     seen = [photo(mesh, camera, truth, gain) for camera, gain in zip(cameras, gains, strict=True)]
@@ -128,7 +128,7 @@ def test_the_other_side_is_taken_from_the_mirror(mesh: Mesh) -> None:
     assert psnr(again[60:-60, 110:-110, :3], inner[..., :3]) > 48
 
 
-def test_parts_keep_to_themselves(mesh: Mesh) -> None:
+def test_parts_do_not_bleed_into_each_other(mesh: Mesh) -> None:
     both = with_nose(mesh)
     both = Mesh(
         both.vertices,

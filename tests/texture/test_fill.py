@@ -42,7 +42,7 @@ def test_certain_colours_stay(fill: str, rng: np.random.Generator) -> None:
     np.testing.assert_allclose(filled[confidence > 0], blend.colours[confidence > 0], atol=1e-6)
 
 
-def test_a_part_keeps_what_is_seen_and_turns_into_its_own_colour_further_away() -> None:
+def test_a_part_fades_to_its_own_colour() -> None:
     confidence = np.zeros((96, 96))
     confidence[40:56, 40:56] = 1
     filled = fill_part(uniform((100, 50, 20), confidence), np.full(3, 200.0), 10)

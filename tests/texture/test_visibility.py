@@ -49,7 +49,7 @@ def test_certainty_is_the_cosine_towards_the_camera() -> None:
 
 
 @pytest.mark.parametrize("least", [0.17, 0.4, 0.7])
-def test_what_is_turned_away_further_than_asked_for_is_invisible(least: float) -> None:
+def test_surfaces_below_the_minimal_certainty_are_invisible(least: float) -> None:
     mesh = ellipsoid()
     surface = atlas_surface(mesh, width=100, height=80)
     view = prepare_view(mesh, camera_at(0, mesh), GREY)

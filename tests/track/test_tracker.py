@@ -14,7 +14,7 @@ from marked import Blind
 from mien.arrays import Array
 from mien.errors import InputError
 from mien.numeric.rotation import angle_between
-from mien.track.landmarks.initialization import Found, Starter
+from mien.track.landmarks.initialization import HeadDetection, HeadDetector
 from mien.track.parameters import Parameters
 from mien.track.state import TrackedFrame, TrackState
 from mien.track.tracker import MISMATCH_RMS, Tracker, TrackOptions
@@ -48,19 +48,19 @@ class Told:
         self.number: int | None = 0
         self.asked = 0
 
-    def find(self, *_: object, small: bool = False, **__: object) -> list[Found]:
+    def detect(self, *_: object, small: bool = False, **__: object) -> list[HeadDetection]:
         self.asked += 1
         if self.number is None or small:
             return []
         off = np.zeros(17)
         off[:6] = (0.015, -0.015, 0.01, 3, -2, 8)
-        return [Found(state_of(truth(self.number).plus(off)), 1.0)]
+        return [HeadDetection(state_of(truth(self.number).plus(off)), 1.0)]
 
 
 @pytest.fixture
 def told(monkeypatch: pytest.MonkeyPatch) -> Told:
     one = Told()
-    monkeypatch.setattr(Starter, "find", one.find)
+    monkeypatch.setattr(HeadDetector, "detect", one.detect)
     return one
 
 
@@ -192,11 +192,13 @@ def test_of_several_faces_the_heads_own_is_found(
     told: Told, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The first, larger one is somewhere else; the landmarks of both fit alike."""
-    elsewhere = Found(
+    elsewhere = HeadDetection(
         state_of(Parameters(patterned.pose((0, 0, 0), (90, 40, 500)), truth(0).face)), 1.0
     )
-    alone = told.find
-    monkeypatch.setattr(Starter, "find", lambda *rest, **options: [elsewhere, *alone(**options)])
+    alone = told.detect
+    monkeypatch.setattr(
+        HeadDetector, "detect", lambda *rest, **options: [elsewhere, *alone(**options)]
+    )
     by = tracker()
     found = by.step(frame(0), 0, 0.0)
     assert found.status == "ok"

@@ -16,14 +16,14 @@ from scipy.optimize import linear_sum_assignment
 from mien.arrays import Array, Bool, Float, Int, UInt8
 from mien.camera import Camera
 from mien.mesh import Mesh
-from tools.assets.shading import Look, Paint, camera_at, rasterize_mesh, shade
+from tools.assets.shading import Lighting, Paint, camera_at, rasterize_mesh, shade
 
 YAWS = (-30.0, -15.0, 0.0, 15.0, 30.0)
-LOOKS = (
-    Look(),
-    Look(light=(-0.6, -0.4, -1.0)),
-    Look(light=(0.0, -0.8, -1.0), ambient=0.45),
-    Look(light=(0.5, -0.1, -1.0), brightness=0.55),
+LIGHTINGS = (
+    Lighting(),
+    Lighting(light=(-0.6, -0.4, -1.0)),
+    Lighting(light=(0.0, -0.8, -1.0), ambient=0.45),
+    Lighting(light=(0.5, -0.1, -1.0), brightness=0.55),
 )
 _IRISES = slice(468, 478)
 _SIZE = 900
@@ -69,7 +69,7 @@ def attach(mesh: Mesh, paint: Paint, allowed: Bool[Array, " f"], model: bytes) -
     casts, weights = [], []
     with _Detector(model) as detector:
         camera = camera_at(0, size=_SIZE)
-        pictures = [shade(mesh, camera, paint, look) for look in LOOKS]
+        pictures = [shade(mesh, camera, paint, lighting) for lighting in LIGHTINGS]
         frontal = np.mean([detector.landmarks(picture) for picture in pictures], axis=0)
         sideways = (frontal[:, 0] - _SIZE / 2) / camera.focal_px * camera.t_cam_head[2]
         for camera, image, yaw in _pictures(mesh, paint):
@@ -152,8 +152,8 @@ class _Detector:
 def _pictures(mesh: Mesh, paint: Paint) -> Iterator[tuple[Camera, UInt8[Array, "h w 3"], float]]:
     for yaw in YAWS:
         camera = camera_at(yaw, size=_SIZE)
-        for look in LOOKS:
-            yield camera, shade(mesh, camera, paint, look), yaw
+        for lighting in LIGHTINGS:
+            yield camera, shade(mesh, camera, paint, lighting), yaw
 
 
 def _cast(

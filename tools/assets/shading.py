@@ -17,7 +17,7 @@ _SKIN, _LIPS, _HAIR = (0.80, 0.62, 0.54), (0.66, 0.36, 0.35), (0.22, 0.15, 0.11)
 
 
 @dataclass(frozen=True)
-class Look:
+class Lighting:
     """How a picture is lit.
 
     Attributes:
@@ -86,18 +86,18 @@ def rasterize_mesh(mesh: Mesh, camera: Camera) -> Raster:
     )
 
 
-def shade(mesh: Mesh, camera: Camera, paint: Paint, look: Look) -> UInt8[Array, "h w 3"]:
+def shade(mesh: Mesh, camera: Camera, paint: Paint, lighting: Lighting) -> UInt8[Array, "h w 3"]:
     """A picture of the mesh, matt, on grey."""
     raster = rasterize_mesh(mesh, camera)
     normals = interpolate(raster, mesh.triangles, mesh.vertex_normals() @ camera.R_cam_head.T)
     normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-9)
-    light = np.array(look.light) / np.linalg.norm(look.light)
-    lit = look.ambient + (1 - look.ambient) * np.clip(normals @ light, 0, 1)
+    light = np.array(lighting.light) / np.linalg.norm(lighting.light)
+    lit = lighting.ambient + (1 - lighting.ambient) * np.clip(normals @ light, 0, 1)
     attributes = interpolate(
         raster, mesh.triangles, np.column_stack([paint.colours, paint.off_axis])
     )
     image, off_axis = attributes[..., :3], attributes[..., 3:]
     image = np.where(off_axis < _IRIS_MM, np.array(_IRIS), image)
     image = np.where(off_axis < _PUPIL_MM, 0.03, image)
-    image = np.where(raster.mask[:, :, None], image * lit[:, :, None] * look.brightness, 0.55)
+    image = np.where(raster.mask[:, :, None], image * lit[:, :, None] * lighting.brightness, 0.55)
     return (255 * np.clip(image, 0, 1)).astype(np.uint8)

@@ -12,5 +12,5 @@ from mien.animate.timeline import Placement as Placement
 from mien.animate.timeline import Timeline as Timeline
 from mien.io.timeline.timeline_file import load_timeline as load_timeline
 from mien.io.timeline.timeline_json import save_timeline as save_timeline
-from mien.pipelines.animate import Take as Take
+from mien.pipelines.animate import AnimationResult as AnimationResult
 from mien.pipelines.animate import animate_head as animate_head

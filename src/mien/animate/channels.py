@@ -1,4 +1,4 @@
-"""The names of everything that a timeline moves, and what a set of values of them means."""
+"""Channels of a timeline, and the face state and head pose that their values stand for."""
 
 from __future__ import annotations
 
@@ -12,39 +12,45 @@ from mien.rig.state import FACE, FaceState, Gaze
 HEAD, GAZE, UNITS = "head", "gaze", "units"
 """Groups of channels besides the regions. A channel's name is GROUP.NAME: `units.jawOpen`."""
 
-MEMBERS = {HEAD: ("yaw", "pitch", "roll", "x", "y", "z"), GAZE: ("yaw", "pitch")}
-ANGLES = frozenset(f"{group}.{name}" for group in MEMBERS for name in ("yaw", "pitch", "roll"))
+CHANNEL_NAMES = {HEAD: ("yaw", "pitch", "roll", "x", "y", "z"), GAZE: ("yaw", "pitch")}
+ANGLES = frozenset(
+    f"{group}.{name}" for group in CHANNEL_NAMES for name in ("yaw", "pitch", "roll")
+)
 
 REGION_NAMES = tuple(ENCLOSING_REGIONS)
 
 
-def split(channel: str) -> tuple[str, str]:
-    """`mouth.joy` to ("mouth", "joy"). Raises: InputError: not GROUP.NAME."""
+def split_channel(channel: str) -> tuple[str, str]:
+    """`mouth.joy` to ("mouth", "joy").
+
+    Raises:
+        InputError: not GROUP.NAME.
+    """
     group, _, name = channel.partition(".")
-    if not (group and name) or name not in MEMBERS.get(group, (name,)):
+    if not (group and name) or name not in CHANNEL_NAMES.get(group, (name,)):
         raise InputError("channel", "GROUP.NAME as units.jawOpen, mouth.joy or head.yaw", channel)
     return group, name
 
 
-def to_state(values: Mapping[str, float]) -> FaceState:
-    """The face that these values by channel describe; what they leave out is at rest.
+def state_from_channels(values: Mapping[str, float]) -> FaceState:
+    """The face state with these values by channel; channels that are missing are 0.
 
-    Weights of a region come on top of those of the regions around it (`left_mouth` on `mouth` on
-    `face`), so that a motion of the mouth can be added to any face and fades in without a jump.
+    Weights of a region are added to those of the regions that contain it (`left_mouth` to `mouth`
+    to `face`), so that a motion of the mouth can be added to any face and fades in smoothly.
     """
     units: dict[str, float] = {}
     own: dict[str, dict[str, float]] = {}
     for channel, value in values.items():
-        group, name = split(channel)
+        group, name = split_channel(channel)
         if group == UNITS:
             units[name] = float(value)
-        elif group not in MEMBERS:
+        elif group not in CHANNEL_NAMES:
             own.setdefault(group, {})[name] = float(value)
     gaze = Gaze(float(values.get("gaze.yaw", 0)), float(values.get("gaze.pitch", 0)))
-    return FaceState({region: _with_surroundings(own, region) for region in own}, units, gaze)
+    return FaceState({region: _with_enclosing(own, region) for region in own}, units, gaze)
 
 
-def _with_surroundings(own: Mapping[str, Mapping[str, float]], region: str) -> dict[str, float]:
+def _with_enclosing(own: Mapping[str, Mapping[str, float]], region: str) -> dict[str, float]:
     total: dict[str, float] = {}
     for name in (*ENCLOSING_REGIONS.get(region, (FACE,)), region):
         for expression, weight in own.get(name, {}).items():
@@ -73,8 +79,8 @@ def head_angles_rad(
 
     Args:
         rotation: of head space.
-        order: "yxz" for head_rotation's own; "YXZ" where yaw turns the head that pitch has tipped
-            already, as a neck does and as most other programs count.
+        order: "yxz", that of head_rotation, or "YXZ", intrinsic rotations, as a neck and most other
+            programs have them.
     """
     from scipy.spatial.transform import Rotation
 

@@ -1,4 +1,4 @@
-"""Values over time from a few keys: smooth, straight or held between them."""
+"""Curves over time through keys, with cubic, linear or constant interpolation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mien.errors import InputError
 
 Interpolation = Literal["cubic", "linear", "hold"]
 MIN_STEP = 1e-6
-"""Seconds between two keys, at least: a shorter step would be as steep as no number can say."""
+"""Least seconds between two keys: slopes over a shorter step could overflow."""
 
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 _CUBIC, _LINEAR, _ = range(len(INTERPOLATIONS))
@@ -21,16 +21,16 @@ _CUBIC, _LINEAR, _ = range(len(INTERPOLATIONS))
 
 @dataclass(frozen=True)
 class Curve:
-    """A scalar over time; before the first key and after the last one it stays as there.
+    """A scalar over time, constant before the first key and after the last one.
 
     Attributes:
         times: (K,) seconds, K >= 1, rising.
         values: (K,) at those times.
-        interpolation: how the curve goes from each key to the next: "cubic", "linear" or "hold"
-            (the key's value until the next key, whose own value counts from its time on).
-        slopes_in: (K,) value a second with which a cubic arrives at the key; NaN: automatic.
-        slopes_out: (K,) with which it leaves.
-        slopes: (2, K) both with the automatic ones filled in; made, not given.
+        interpolation: from each key to the next: "cubic", "linear" or "hold"
+            (constant until the next key).
+        slopes_in: (K,) derivative of a cubic before the key, per second; NaN: automatic.
+        slopes_out: (K,) derivative after the key.
+        slopes: (2, K) both, with the automatic ones filled in; computed, not given.
 
     Raises:
         InputError: no key, a time that does not rise, NaN, an unknown interpolation.
@@ -73,7 +73,7 @@ class Curve:
         object.__setattr__(self, "interpolation", kinds)
 
     def at(self, times: Float[Array, " n"]) -> Float[Array, " n"]:
-        """(N,) values at these times in seconds; at a key exactly the key's value."""
+        """(N,) values at these times in seconds, exact at keys."""
         times = np.asarray(times, dtype=np.float64)
         start = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, None)
         end = np.minimum(start + 1, len(self.times) - 1)
@@ -88,7 +88,7 @@ class Curve:
 
     @cached_property
     def _kinds(self) -> Int[Array, " k"]:
-        """The interpolations by their places in INTERPOLATIONS."""
+        """Indices into INTERPOLATIONS."""
         return np.array([INTERPOLATIONS.index(kind) for kind in self.interpolation], np.int8)
 
     def scaled(self, factor: float) -> Curve:
@@ -102,7 +102,7 @@ class Curve:
         )
 
     def baked(self, times: Float[Array, " n"]) -> Curve:
-        """The curve's values at these rising times, joined by straight lines."""
+        """The curve sampled at these rising times, with linear interpolation."""
         return sampled(times, self.at(times))
 
 

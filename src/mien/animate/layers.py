@@ -1,4 +1,4 @@
-"""Motions that make themselves: blinking and breathing, the same for the same seed."""
+"""Procedural motion: blinking and breathing, reproducible by seed."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from mien.arrays import Array, check_array
 from mien.errors import InputError
 
 MIN_PERIOD = 0.1
-"""Seconds: nobody blinks or breathes faster, and a shorter one would ask for endless keys."""
+"""Seconds; limits the number of keys."""
 
 
 @dataclass(frozen=True)
 class Blink:
-    """Both eyes blink now and then.
+    """Both eyes blink at random intervals.
 
     Attributes:
         period: seconds from one blink to the next, on average.
         jitter: share of the period by which each blink comes earlier or later, 0 to 0.9.
-        closing: seconds that the lids take to fall, stay and rise.
-        closed: seconds that the lids take to fall, stay and rise.
-        opening: seconds that the lids take to fall, stay and rise.
-        amount: how far they fall; 1 closes them.
-        seed: another one gives other times.
+        closing: seconds that the lids take to close.
+        closed: seconds that they stay closed.
+        opening: seconds that they take to open.
+        amount: weight of the blink units; 1 closes the eyes.
+        seed: of the random times.
 
     Raises:
-        InputError: a duration that is none, blinks that would overlap, a jitter out of range.
+        InputError: a duration of 0 or less, blinks that would overlap, a jitter out of range.
     """
 
     period: float = 4.0
@@ -68,15 +68,15 @@ class Blink:
 
 @dataclass(frozen=True)
 class Breathing:
-    """The head rises and falls a little, and never stands quite still.
+    """Small motion of the head with the breath, and slow sway.
 
     Attributes:
         period: seconds a breath.
         jitter: share by which breaths differ in length.
-        rise: mm by which breathing in lifts the head.
-        tip: radians by which it tips it back.
-        sway: radians of slow turning and leaning, slower than the breath.
-        seed: another one gives another motion.
+        rise: mm that the head is lifted by breathing in.
+        tip: radians that it is tilted back.
+        sway: radians of yaw and roll, slower than the breath.
+        seed: of the random motion.
 
     Raises:
         InputError: a period below MIN_PERIOD, a jitter out of range, NaN.

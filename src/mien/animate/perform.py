@@ -1,8 +1,7 @@
-"""A timeline frame by frame, and the camera that sees the head move."""
+"""The frames of a timeline, and the camera relative to the moved head."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,10 +13,11 @@ from mien.errors import InputError
 from mien.limits import MAX_FPS, MAX_FRAMES
 
 
-def frames_of(timeline: Timeline, fps: float | None = None) -> Float[Array, " n"]:
-    """(N,) seconds of the frames: from 0, one every 1 / fps, as many as fill the duration.
+def frame_times(timeline: Timeline, fps: float | None = None) -> Float[Array, " n"]:
+    """(N,) seconds of the frames: from 0, one every 1 / fps, until the duration.
 
     Args:
+        timeline: to be sampled.
         fps: frames a second; the timeline's own unless given.
 
     Raises:
@@ -33,16 +33,12 @@ def frames_of(timeline: Timeline, fps: float | None = None) -> Float[Array, " n"
     return np.arange(count) / rate
 
 
-def moments(timeline: Timeline, fps: float | None = None) -> Iterator[Moment]:
-    """Face and head at every frame."""
-    return timeline.moments_at(frames_of(timeline, fps))
-
-
 def moved_camera(camera: Camera, moment: Moment) -> Camera:
     """The camera that sees the head at rest as `camera` sees the moved head.
 
     Args:
-        camera: sees head space; the head moves in it.
+        camera: of the head at rest.
+        moment: pose of the head.
     """
     return replace(
         camera,

@@ -1,4 +1,4 @@
-"""The performance that ships with mien: units alone, so that any head can give it."""
+"""The timeline that ships with mien; it has only units, so that it fits any head."""
 
 from __future__ import annotations
 

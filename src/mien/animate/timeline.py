@@ -1,4 +1,4 @@
-"""What a face and its head do over time: tracks, layers on top of them, clips used again."""
+"""Timelines of face and head: tracks of keys, layers added to them, reusable clips."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from mien.limits import MAX_FPS, MAX_FRAMES, MAX_SECONDS, MAX_SIDE, UNIT_RANGE
 from mien.rig.state import FaceState
 
 PIVOT_MM = (0.0, -60.0, -80.0)
-"""Head space: the top of the neck, where a skull nods and turns."""
+"""Head space: the top of the neck, about which the head rotates."""
 
 MAX_PLAYS, MAX_DEPTH = 10_000, 32
-"""Clips inside of clips multiply; a document of a few lines could ask for years of work."""
+"""Limits on nested clips, whose number of plays grows exponentially."""
 
 _BLOCK = 1024
-"""Moments that are sampled at once: a long performance never lies in memory."""
+"""Moments sampled at once, to limit memory."""
 
 Tracks = Mapping[str, Curve]
 """Curves by channel (`units.jawOpen`, `mouth.joy`, `head.yaw`, `gaze.pitch`); radians and mm."""
@@ -31,14 +31,14 @@ Tracks = Mapping[str, Curve]
 
 @dataclass(frozen=True)
 class Placement:
-    """A clip at a place in time.
+    """A clip placed on a timeline.
 
     Attributes:
         clip: its name.
         at: seconds where it starts.
         speed: 2 plays it in half the time.
         weight: factor on its values.
-        repeats: how often it plays, one after the other; may be a fraction.
+        repeats: number of plays one after the other; may be a fraction.
 
     Raises:
         InputError: a speed or a number of repeats of 0 or less, NaN.
@@ -58,11 +58,11 @@ class Placement:
 
 @dataclass(frozen=True)
 class Clip:
-    """A motion with a name, to be placed as often as one likes; nothing outside of its length.
+    """A motion that can be placed any number of times; 0 outside of its duration.
 
     Attributes:
         duration: seconds.
-        tracks: from 0 to there.
+        tracks: curves by channel, from 0 to the duration.
         placements: of other clips in this one.
     """
 
@@ -77,14 +77,14 @@ class Clip:
 
 @dataclass(frozen=True)
 class Layer:
-    """Motion that is added to everything below it.
+    """Motion that is added to that below it.
 
     Attributes:
-        name: for people.
+        name: for display.
         weight: factor on the layer, over time.
         tracks: as a timeline's.
         placements: as a timeline's.
-        generator: makes further tracks.
+        generator: procedural motion.
     """
 
     name: str = ""
@@ -103,9 +103,9 @@ class Moment:
 
     Attributes:
         time: seconds.
-        state: what the face does.
+        state: of the face.
         rotation: (3, 3).
-        translation: (3,) mm; the pivot's part is in it.
+        translation: (3,) mm; includes the effect of the pivot.
     """
 
     time: float
@@ -116,22 +116,22 @@ class Moment:
 
 @dataclass(frozen=True)
 class Timeline:
-    """A performance: tracks + placed clips + layers, added channel by channel.
+    """Tracks, placed clips and layers, added channel by channel.
 
     Attributes:
         duration: seconds.
         fps: frames a second that it was made for.
-        size: width and height in px of its pictures, where it says so.
-        pivot: (3,) mm, head space: the point about which the head turns.
-        tracks: by channel; one that is not there is at 0.
+        size: width and height in px of its pictures, if given.
+        pivot: (3,) mm, head space: the point about which the head rotates.
+        tracks: by channel; a missing channel is 0.
         placements: of clips, added to the tracks.
         clips: by name.
         layers: added on top.
-        notes: what whoever read it adapted, for the user.
+        notes: for the user, on what was adapted when it was loaded.
 
     Raises:
         InputError: a duration, rate or size of 0 or less, or beyond mien.limits; an unknown clip,
-            one that contains itself, a channel that is none.
+            one that contains itself, an unknown channel.
     """
 
     duration: float
@@ -159,18 +159,18 @@ class Timeline:
         total: dict[str, Array] = {}
         _add(total, self.tracks, times, np.ones_like(times))
         self._add_clips(total, self.placements, times, np.ones_like(times))
-        for layer, made in zip(self.layers, self._made, strict=True):
+        for layer, generated in zip(self.layers, self._generated, strict=True):
             weight = layer.weight.at(times)
             _add(total, layer.tracks, times, weight)
             self._add_clips(total, layer.placements, times, weight)
             before = dict(total)
-            _add(total, made, times, weight)
-            _hold_within(total, before, made)
+            _add(total, generated, times, weight)
+            _limit_units(total, before, generated)
         return total
 
     @cached_property
-    def _made(self) -> tuple[Tracks, ...]:
-        """What each layer's generator makes."""
+    def _generated(self) -> tuple[Tracks, ...]:
+        """Tracks of each layer's generator."""
         generators = (layer.generator for layer in self.layers)
         return tuple({} if item is None else item.channels(self.duration) for item in generators)
 
@@ -187,10 +187,12 @@ class Timeline:
                 yield self._moment(float(time), {name: row[index] for name, row in values.items()})
 
     def _moment(self, time: float, values: Mapping[str, float]) -> Moment:
-        pose = [float(values.get(f"head.{name}", 0.0)) for name in channels.MEMBERS[channels.HEAD]]
+        pose = [
+            float(values.get(f"head.{name}", 0.0)) for name in channels.CHANNEL_NAMES[channels.HEAD]
+        ]
         rotation = channels.head_rotation(pose[0], pose[1], pose[2])
         translation = self.pivot - rotation @ self.pivot + pose[3:]
-        return Moment(time, channels.to_state(values), rotation, translation)
+        return Moment(time, channels.state_from_channels(values), rotation, translation)
 
     def _add_clips(
         self,
@@ -202,7 +204,7 @@ class Timeline:
         for placement in placements:
             clip = self.clips[placement.clip]
             played = (times - placement.at) * placement.speed
-            # Half open, so that a clip that follows at once does not sound at the same time.
+            # Half open, so that a clip that follows at once does not overlap.
             inside = (played >= 0) & (played < placement.repeats * clip.duration)
             here = weight * placement.weight * inside
             within = np.mod(played, clip.duration)
@@ -215,11 +217,11 @@ def _add(total: dict[str, Array], tracks: Tracks, times: Array, weight: Array) -
         total[channel] = total.get(channel, 0.0) + weight * curve.at(times)
 
 
-def _hold_within(
-    total: dict[str, Array], before: Mapping[str, Array], made: Mapping[str, Curve]
+def _limit_units(
+    total: dict[str, Array], before: Mapping[str, Array], generated: Mapping[str, Curve]
 ) -> None:
-    """A motion that makes itself takes no face unit beyond its range: lids close but once."""
-    for channel in made:
+    """Limits face units to their range where a generator was added, as when two blinks coincide."""
+    for channel in generated:
         if channel.startswith(f"{channels.UNITS}."):
             given = before.get(channel, np.zeros_like(total[channel]))
             low, high = np.minimum(given, UNIT_RANGE[0]), np.maximum(given, UNIT_RANGE[1])
@@ -233,7 +235,7 @@ def _check_at_most(name: str, value: float, most: float) -> None:
 
 def _check_channels(tracks: Tracks) -> None:
     for channel in tracks:
-        channels.split(channel)
+        channels.split_channel(channel)
 
 
 def _check_placements(timeline: Timeline) -> None:
@@ -254,7 +256,7 @@ def _check_placements(timeline: Timeline) -> None:
 def _count_plays(
     clips: Mapping[str, Clip], name: str, above: tuple[str, ...], counts: dict[str, int]
 ) -> int:
-    """How many curves' sets one play of a clip evaluates, clips inside of clips counted."""
+    """Number of plays in one play of a clip, nested clips included."""
     if name not in clips:
         raise InputError("clip", f"one of {', '.join(clips) or 'no clips at all'}", name)
     if name in above:

@@ -107,7 +107,7 @@ def load_feature_layout(path: str | Path | None = None) -> FeatureLayout:
 
     Raises:
         InputError: the file cannot be read.
-        FileFormatError: it holds no layout; says where.
+        FileFormatError: it holds no layout; names the place.
     """
     shipped = str(files("mien.assets") / "data" / "zhang134.json")
     return read_data(Path(path or shipped), _FORMAT, _layout)

@@ -27,4 +27,4 @@ FACE_OVAL = frozenset({
 # fmt: on
 
 ON_EDGES = EYES | EYEBROWS | LIPS | NOSE
-"""Landmarks on something that can be seen; the others are spread over plain skin between them."""
+"""Landmarks on visible edges; the others are spread over plain skin between them."""

@@ -8,18 +8,16 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
 from mien.arrays import Array, Float, frozen
+from mien.assets.generic import GenericHead
 from mien.capture.images.photos import Photo
 from mien.errors import FileFormatError, InputError
 from mien.limits import LARGEST
 from mien.reading.strict_json import join, json_type, read_json
-
-if TYPE_CHECKING:
-    from mien.assets.generic import GenericHead
 
 _KEYS = ("photo", "size", "points", "curves")
 _ASPECT_TOLERANCE = 0.005
@@ -40,7 +38,7 @@ class AnnotationNames:
 
     @classmethod
     def of(cls, head: GenericHead) -> Self:
-        """The names that the generic head knows."""
+        """The names of the generic head's points and polylines."""
         vertices = (
             f"{name}.{index}"
             for name, polyline in head.polylines.items()

@@ -40,7 +40,7 @@ def photo_files(source: Path) -> dict[str, list[Path]]:
 
 
 def _expression(folder: Path) -> str:
-    """A folder's name; `Neutral` is `neutral`, as other stages look for that."""
+    """A folder's name; `Neutral` becomes `neutral`."""
     return NEUTRAL if folder.name.lower() == NEUTRAL else portable_name(folder)
 
 

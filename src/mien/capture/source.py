@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mien.arrays import Array, Float, UInt8
+from mien.assets.generic import load_generic_head
 from mien.capture.annotations import AnnotationNames, Annotations, load_annotations
 from mien.capture.faces.detector import NO_FACE_FOUND, LandmarkDetector, NoFaceError
 from mien.capture.faces.landmarks import Landmarks
@@ -64,7 +65,7 @@ class Capture:
         name: of the source, without an ending.
         expressions: views by expression, never empty, `neutral` first where there is one; a source
             without expression folders holds `neutral` alone.
-        notes: what was left out, adapted or looks odd; each names its file.
+        notes: on what was left out, adapted or is odd; each names its file.
     """
 
     name: str
@@ -224,8 +225,6 @@ class _Reader:
 
 @cache
 def _generic_names() -> AnnotationNames:
-    from mien.assets.generic import load_generic_head
-
     return AnnotationNames.of(load_generic_head())
 
 

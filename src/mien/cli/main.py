@@ -1,4 +1,4 @@
-"""The command line: parses, calls, prints. Nothing is computed here."""
+"""The command line: parses arguments, calls a pipeline, prints its result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Command-line values that are more than one number."""
+"""Parsers and checks of command-line values."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def check_given(arguments: Sequence[str]) -> None:
     """Refuse arguments that are empty, which as a path would mean the current folder, or hold NUL.
 
     Raises:
-        InputError: names the option, or the place among the arguments.
+        InputError: with the option, or the position of the argument.
     """
     for place, argument in enumerate(arguments):
         before = arguments[place - 1] if place else ""
@@ -36,7 +36,11 @@ def check_given(arguments: Sequence[str]) -> None:
 
 
 def check_finite(name: str, value: float) -> float:
-    """The value. Raises: InputError: infinite or not a number, both of which parse as floats."""
+    """The value.
+
+    Raises:
+        InputError: infinite or not a number, both of which parse as floats.
+    """
     if not isfinite(value):
         raise InputError(name, "a finite number", value)
     return value
@@ -60,7 +64,7 @@ def parse_size(name: str, text: str) -> tuple[int, int]:
 
 
 def _whole(text: str) -> int:
-    """The number that digits are; 0 where they are none, some large one for very many of them."""
+    """The number of up to 20 digits; 0 for other text."""
     return int(text[:20]) if text.isascii() and text.isdecimal() else 0
 
 
@@ -106,7 +110,7 @@ def parse_state(
     units: list[str] | None,
     gaze: str | None,
 ) -> FaceState:
-    """What a face does, by the options of `mien render`. Raises: InputError."""
+    """The state of a face from the options of `mien render`. Raises: InputError."""
     from mien.rig.state import FACE, FaceState, Gaze
 
     everywhere = parse_amounts(

@@ -1,4 +1,4 @@
-"""What commands print in the end, as text or as JSON."""
+"""Results and errors of commands, printed as text or JSON."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _parts(error: Exception) -> dict[str, str]:
-    """What a message is made of, for programs."""
+    """Fields of an error, for programs."""
     if isinstance(error, InputError):
         return {"name": error.name, "expected": error.expected, "found": error.got}
     if isinstance(error, FileFormatError):
@@ -50,16 +50,16 @@ def _parts(error: Exception) -> dict[str, str]:
 def print_result(
     as_json: bool, data: dict[str, Any], text: str, notes: tuple[str, ...] = ()
 ) -> None:
-    """The result on stdout; notes, which the JSON has in it, on stderr."""
+    """The result on stdout; notes on stderr, unless the JSON has them."""
     print(json.dumps(_escaped_within(data), indent=2) if as_json else escaped(text))
     for note in () if as_json else notes:
         print("note:", escaped(note), file=sys.stderr)
 
 
 def set_up_streams() -> None:
-    """From here on, no character stops a line: what a terminal cannot show is escaped.
+    """Escapes characters that the terminal cannot show, instead of failing.
 
-    What Matplotlib, which MediaPipe imports, says of folders where it keeps fonts stays out.
+    Also silences Matplotlib, which MediaPipe imports, on its font cache.
     """
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     for stream in (sys.stdout, sys.stderr):

@@ -1,4 +1,4 @@
-"""Progress bars on the terminal: one line a stage, with time left."""
+"""Progress bars on the terminal: one line a stage, with remaining time."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def terminal_progress(quiet: bool, *, counted: Collection[str] = ()) -> Iterator
 
     Args:
         quiet: draw nothing.
-        counted: stages whose steps are frames; it is said how many a second.
+        counted: stages whose steps are frames; their rate is shown.
 
     Yields:
-        a function of (stage, done, total); total 0 means "unknown, still at it".
+        a function of (stage, done, total); total 0 means unknown.
     """
     if quiet:
         yield no_progress
@@ -70,5 +70,5 @@ def terminal_progress(quiet: bool, *, counted: Collection[str] = ()) -> Iterator
 
 
 def _speed(task: Task) -> str:
-    """Over the last half-minute; what an earlier run had done does not count."""
+    """Rate over the last half-minute, without frames of an earlier run."""
     return f"{task.speed:.1f} frames/s" if task.speed else ""

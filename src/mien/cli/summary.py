@@ -1,4 +1,4 @@
-"""What a build says when it is done."""
+"""Summary of a finished build."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def summary_json(result: Build, folder: Path) -> dict[str, Any]:
                     "focal_px": round(view.camera.focal_px, 2),
                     "rms_px": round(view.rms_px, 4),
                     "points_used": view.points_used,
-                    "distrusted": view.distrusted,
+                    "distrusted": view.outliers,
                 }
                 for view in expression.views
             ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -161,8 +162,6 @@ def _solve_constrained(matrix: Array, terms: Array, values: Array) -> Float[Arra
 
     In a basis of the conditions' null space the kernel matrix is positive definite.
     """
-    import warnings
-
     from scipy.linalg import LinAlgError, LinAlgWarning, solve
 
     free = np.linalg.qr(terms, mode="complete")[0][:, terms.shape[1] :]

@@ -1,4 +1,4 @@
-"""`mien animate`: a head performs a timeline, into whatever file is asked for."""
+"""`mien animate`: a head animated by a timeline, to a video, pictures, a model or numbers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mien.animate.perform import frames_of, moved_camera
+from mien.animate.perform import frame_times, moved_camera
 from mien.animate.timeline import Moment, Timeline
 from mien.arrays import Array, UInt8
 from mien.errors import FileFormatError, InputError
@@ -27,12 +27,12 @@ STAGE = "Animating"
 
 
 @dataclass(frozen=True)
-class Take:
-    """What came of a performance.
+class AnimationResult:
+    """Result of animate_head.
 
     Attributes:
-        frames: how many were written.
-        notes: what the user should know, such as weights past what was photographed.
+        frames: number of frames written.
+        notes: for the user, such as weights that extrapolate the photographed expressions.
     """
 
     frames: int
@@ -41,7 +41,7 @@ class Take:
 
 @dataclass(frozen=True)
 class _Job:
-    """One head's performance, frame by frame, before one camera."""
+    """One head, timeline and camera."""
 
     renderer: HeadRenderer
     timeline: Timeline
@@ -50,19 +50,19 @@ class _Job:
     yaw: float
     pitch: float
     background: tuple[int, int, int] | None
-    tell: StepProgress = field(repr=False)
+    progress: StepProgress = field(repr=False)
 
     @cached_property
     def times(self) -> Array:
-        return frames_of(self.timeline, self.fps)
+        return frame_times(self.timeline, self.fps)
 
     def moments(self) -> Iterator[Moment]:
-        """One a frame; tells how far it is."""
+        """One a frame; reports progress."""
         times = self.times
-        self.tell(0, len(times))
+        self.progress(0, len(times))
         for index, moment in enumerate(self.timeline.moments_at(times), 1):
             yield moment
-            self.tell(index, len(times))
+            self.progress(index, len(times))
 
     def pictures(self, background: tuple[int, int, int] | None) -> Iterator[UInt8[Array, "h w c"]]:
         """One a frame: with alpha where there is no background."""
@@ -85,10 +85,10 @@ def animate_head(
     background: tuple[int, int, int] | None = None,
     read: Iterable[str | Path] = (),
     progress: Progress | None = None,
-) -> Take:
-    """Let a head perform a timeline, into a video, pictures, a model or a table.
+) -> AnimationResult:
+    """Animate a head by a timeline, to a video, pictures, a model or a table.
 
-    Frames are made one at a time; what was at the place stays until the new file is whole.
+    Frames are made one at a time; an existing file stays until the new one is complete.
 
     Args:
         head: the head.
@@ -97,19 +97,19 @@ def animate_head(
             (MPEG-4); a name without one, or with a slash at its end, is a folder of pictures.
         fps: frames a second; the timeline's unless given.
         size: width and height of pictures, px; the timeline's unless given.
-        yaw: radians, how the head is turned before it moves; for pictures.
-        pitch: radians, how the head is turned before it moves; for pictures.
+        yaw: radians, pose of the head at rest; for pictures.
+        pitch: as `yaw`.
         background: sRGB. Unless given, pictures and .webm have alpha and an .mp4 a plain grey.
-        read: files and folders beside the timeline that must stay as they are, such as the head's.
+        read: further inputs, such as the head's folder, which must not be overwritten.
         progress: called with the stage, frames done and their total.
 
     Returns:
         How many frames were written, and notes for the user.
 
     Raises:
-        InputError: another suffix, a place that is read or cannot be written, a rate that a .fap
-            cannot say.
-        FileFormatError: the timeline; what in it the head cannot do, by place; more than
+        InputError: another suffix, a path that is an input or cannot be written, a rate that a
+            .fap cannot have.
+        FileFormatError: the timeline; channels that the head lacks, by place; more than
             MAX_FRAMES.
     """
     files = [] if isinstance(timeline, Timeline) else timeline_files(timeline)
@@ -117,7 +117,6 @@ def animate_head(
     name = timeline if isinstance(timeline, (str, Path)) else "timeline"
     played = timeline if isinstance(timeline, Timeline) else load_timeline(timeline)
     check_timeline(played, expressions=head.expressions, units=head.unit_names, path=name)
-    tell = progress or no_progress
     job = _Job(
         renderer=HeadRenderer(head),
         timeline=played,
@@ -126,7 +125,7 @@ def animate_head(
         yaw=yaw,
         pitch=pitch,
         background=background,
-        tell=stage_progress(tell, STAGE),
+        progress=stage_progress(progress or no_progress, STAGE),
     )
     try:
         _ = job.times
@@ -134,14 +133,14 @@ def animate_head(
         problem = f"expected {error.expected}, found {error.got}"
         raise FileFormatError(name, problem, error.name) from None
     notes = (*played.notes, *_hull_notes(job, name))
-    return Take(write(job, path), notes)
+    return AnimationResult(write(job, path), notes)
 
 
 def _hull_notes(job: _Job, name: str | Path) -> tuple[str, ...]:
-    """What goes beyond the photographed expressions, and when farthest; before a frame is drawn.
+    """Notes on weights that extrapolate the expressions, with the time of the largest excess.
 
     Raises:
-        FileFormatError: weights that no face may have, and when.
+        FileFormatError: weights out of range, with their time.
     """
     rig = job.renderer.rig
     farthest: dict[str, tuple[float, float, Mapping[str, float]]] = {}
@@ -151,9 +150,9 @@ def _hull_notes(job: _Job, name: str | Path) -> tuple[str, ...]:
         except InputError as error:
             raise FileFormatError(name, str(error), f"at {moment.time:.2f} s") from None
         for region, weights in moment.state.expressions.items():
-            beyond = _beyond(weights)
-            if region not in farthest or beyond > farthest[region][0]:
-                farthest[region] = beyond, moment.time, weights
+            excess = _excess(weights)
+            if region not in farthest or excess > farthest[region][0]:
+                farthest[region] = excess, moment.time, weights
     return tuple(
         f"{note} at {time:.2f} s"
         for region, (_, time, weights) in farthest.items()
@@ -161,17 +160,18 @@ def _hull_notes(job: _Job, name: str | Path) -> tuple[str, ...]:
     )
 
 
-def _beyond(weights: Mapping[str, float]) -> float:
-    """How far the farthest weight, neutral's too, lies outside of 0 to 1; negative inside."""
+def _excess(weights: Mapping[str, float]) -> float:
+    """Largest excess of a weight, neutral's included, over 0 to 1; negative inside."""
     given = list(weights.values())
     every = given if NEUTRAL in weights else [1 - sum(given), *given]
     return max(max(-weight, weight - 1) for weight in every)
 
 
 def _writer(path: str | Path, read: Iterable[str | Path]) -> Callable[[_Job, str | Path], int]:
-    """By suffix. Raises: InputError: no such kind, a place that is read, a folder that holds other
+    """The function that writes this kind of file, by suffix.
 
-    things.
+    Raises:
+        InputError: unknown suffix, a path that is an input, a folder with other files.
     """
     from mien.io.files.frames import check_frames_place
 

@@ -245,7 +245,7 @@ def _fitted_views(fit: Fit) -> tuple[FittedView, ...]:
             camera=item.camera,
             rms_px=item.rms_px,
             points_used=item.points_used,
-            distrusted={mark.name: mark.rejection for mark in item.marks if mark.rejection},
+            outliers={mark.name: mark.rejection for mark in item.marks if mark.rejection},
         )
         for photo, item in fit.photos.items()
     )

@@ -66,7 +66,7 @@ def find_head(head: Head, photo: Photo) -> HeadInPhoto:
         largest = detector.detect(photo)  # Fails before the slow preparation of the head.
         ready = ReadyHead(head, detector, TrackOptions())
         # The tracker finds upright faces only.
-        start = ready.starter.fit(largest.as_detected_face(), size=photo.size, focal_px=focal)
+        start = ready.head_detector.fit(largest.as_detected_face(), size=photo.size, focal_px=focal)
         tracked = [
             ready.tracker(width, height, focal).step(pixels, 0, 0.0, initial)
             for initial in (None, start)

@@ -31,7 +31,7 @@ def find_focal(
     expected = expected_focal(ready.head, facts.width, facts.height)
     tracker = ready.tracker(facts.width, facts.height, expected.focal_px)
     frames = _first(clip, total, tell)
-    found = estimate_focal(frames, ready.starter, ready.head, is_own=tracker.resembles)
+    found = estimate_focal(frames, ready.head_detector, ready.head, is_match=tracker.resembles)
     reduced = min(1.0, _SIDE / max(facts.width, facts.height))
     return found.focal_px / reduced, found.note
 

@@ -14,7 +14,7 @@ _MAX_COUNT = 100_000
 """Files of points hold fewer; a larger number is no count."""
 
 
-class Numbers:
+class NumberReader:
     """The numbers of a file, read one after the other.
 
     Args:

@@ -74,7 +74,9 @@ def match_curve(
 
     Args:
         reference_points: (N, 2) px in order along the curve in the reference photo.
+        reference_camera: of the reference photo.
         curve: (M, 2) px, the same curve drawn in the other photo, in the same direction.
+        camera: of the other photo.
         fractions: (N,) in [0, 1], increasing: the reference points' arc-length positions; equally
             spaced unless given.
         max_shift: how far, as a fraction of length, a crossing may lie from its arc-length place.
@@ -107,9 +109,9 @@ def match_curve(
 def epipolar_lines(
     points: Float[Array, "n 2"], source: Camera, target: Camera
 ) -> Float[Array, "n 3"]:
-    """Lines (a, b, c) with a x + b y + c = 0, a^2 + b^2 = 1, in the target's px, on which the
+    """Epipolar lines of the source's image points in the target's px.
 
-    source's image points must appear. NaN where the cameras share their place.
+    Lines (a, b, c) with a x + b y + c = 0, a^2 + b^2 = 1; NaN where the cameras coincide.
     """
     to_target = target.R_cam_head @ source.R_cam_head.T
     shift = target.t_cam_head - to_target @ source.t_cam_head

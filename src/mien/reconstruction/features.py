@@ -23,12 +23,12 @@ CURVE_SIGMA_MM = 1.0
 EDGE_SIGMA_MM = 2.5
 """How far a landmark on an eye, brow, lip or the nose slides over the skin between views."""
 SKIN_SIGMA_MM = 12.0
-"""The same for one on plain skin, which the detector only guesses (docs/method/cameras.md)."""
+"""The same for one on plain skin, which the detector only interpolates (docs/method/cameras.md)."""
 MIN_CONFIDENCE = 0.1
 """Landmarks below are not used: the surface turns away there."""
-ENOUGH_NAMED = 8
+MIN_NAMED_POINTS = 8
 """With so many named points in a photo its camera is found without its curves."""
-WINS_WITHIN_MM = 25.0
+MARK_RADIUS_MM = 25.0
 """A hand-made mark silences the same photo's detector this far around it."""
 
 
@@ -53,7 +53,7 @@ class Features:
     by_hand: Bool[Array, "k n"]
 
     @property
-    def seen(self) -> Bool[Array, "k n"]:
+    def observed(self) -> Bool[Array, "k n"]:
         """(K, N) where a photo shows a feature."""
         return np.asarray(np.isfinite(self.sigma_mm))
 
@@ -138,7 +138,7 @@ def image_points_for_cameras(features: Features) -> Float[Array, "k n 2"]:
     """
     drawn = features.by_hand & (features.sigma_mm == CURVE_SIGMA_MM)
     named = features.by_hand & ~drawn
-    enough = named.sum(axis=1) >= ENOUGH_NAMED
+    enough = named.sum(axis=1) >= MIN_NAMED_POINTS
     return np.where((drawn & enough[:, None])[..., None], np.nan, features.image_points)
 
 
@@ -225,6 +225,6 @@ def _silence_landmarks(features: Features, generic: GenericHead) -> Features:
     for k, hand in enumerate(features.by_hand):
         if hand.any():
             distance = cKDTree(places[hand]).query(places)[0]
-            sigma[k, landmark & (distance < WINS_WITHIN_MM)] = np.inf
+            sigma[k, landmark & (distance < MARK_RADIUS_MM)] = np.inf
     image = np.where(np.isfinite(sigma)[..., None], features.image_points, np.nan)
     return replace(features, image_points=image, sigma_mm=sigma)

@@ -17,25 +17,25 @@ from mien.progress import StepProgress
 from mien.reconstruction.features import gather_features
 from mien.reconstruction.landmark_fit import FitOptions, Solution, residuals_of, solve_by_features
 from mien.reconstruction.outliers import (
-    HOPELESS_SIGMAS,
+    INCONSISTENT_SIGMAS,
+    classify_marks,
     depth_notes,
-    find_misfit,
-    judge_marks,
+    find_outlier_photo,
+    largest_view_angle,
     name_notes,
-    view_spread,
 )
 from mien.reconstruction.registration import register_solution
 from mien.reconstruction.result import NeutralFit, PhotoFit
 from mien.reconstruction.shape.deformation import eye_centers
-from mien.reconstruction.shape.feature_guide import guide_features
+from mien.reconstruction.shape.feature_alignment import align_features
 
 __all__ = ["FitOptions", "NeutralFit", "fit_views"]
 
-ONE_SIDE_DEG = 10.0
-"""Photos from within so much, as landmarks alone have it, tell no depth."""
-ONE_SIDE = "it looks from the same side as {}, and would only blur what that one shows"
-NEARER_TELLS = 1.3
-"""Unless one is taken from so many times the distance of another: perspective tells it, too."""
+MIN_VIEW_ANGLE_DEG = 10.0
+"""Photos whose viewing directions, from landmarks alone, differ by less do not determine depth."""
+SAME_SIDE = "it looks from the same side as {}, and would only blur what that one shows"
+MIN_DISTANCE_RATIO = 1.3
+"""Unless one is taken from so many times the distance of another: perspective shows depth, too."""
 
 
 def fit_views(
@@ -48,7 +48,10 @@ def fit_views(
     """Cameras and shape of one expression.
 
     Args:
-        progress: told the steps of the registration done and their total.
+        views: photos of the expression.
+        generic: the generic head.
+        options: how it is fitted.
+        progress: called with the steps of the registration done and their total.
 
     Raises:
         EstimationError: no photo fits.
@@ -79,46 +82,46 @@ def _fit_views(
     while True:
         solution = solve_by_features(marked, gather_features(marked, generic), generic, options)
         left_out |= solution.problems
-        misfit = _misfit(solution, generic, options)
-        if misfit is None:
+        outlier = _outlier_photo(solution, generic, options)
+        if outlier is None:
             break
-        worst, why = misfit
+        worst, why = outlier
         left_out[solution.views[worst].photo.name] = why
         marked = [view for k, view in enumerate(solution.views) if k != worst]
     if options.dense and options.adjust:
-        solution = _all_photos(solution, faceless, generic, options, progress)
+        solution = _registered(solution, faceless, generic, options, progress)
         left_out |= solution.problems
     else:
         left_out |= {view.photo.name: NO_FACE_FOUND for view in faceless}
     if options.adjust:
-        solution = _guided(solution, generic)
+        solution = _with_aligned_features(solution, generic)
     vertices, cameras = _in_head_space(solution, generic, options)
     sigma_px = solution.features.sigma_px(solution.cameras)
     photos = {}
     for k, (view, camera) in enumerate(zip(solution.views, cameras, strict=True)):
-        marks = judge_marks(solution.features, k, solution.residuals[k], sigma_px[k])
+        marks = classify_marks(solution.features, k, solution.residuals[k], sigma_px[k])
         matches, rms_px = solution.matches[k] if solution.matches else (0, 0.0)
         photos[view.photo.name] = PhotoFit(camera, marks, matches, rms_px)
     notes = (*depth_notes(cameras), *solution.notes, *name_notes(photos))
     return NeutralFit(vertices, photos, left_out, notes, uncertainty_mm=solution.uncertainty_mm)
 
 
-def _all_photos(
+def _registered(
     solution: Solution,
     faceless: Sequence[CapturedView],
     generic: GenericHead,
     options: FitOptions,
     progress: StepProgress | None,
 ) -> Solution:
-    """The solution by the skin that the photos share; where they look from one side, one's own."""
+    """The solution by shared skin; of one photo where all look from the same side."""
     if faceless or len(solution.views) == 1 or not _from_one_side(solution.cameras):
         return register_solution(solution, faceless, generic, progress)
-    # Depth would be noise. The photo that tells most by itself gives the shape.
+    # Depth would be noise. The photo with the most information gives the shape.
     best = int(np.nansum(1 / solution.features.sigma_mm, axis=1).argmax())
     view = solution.views[best]
     alone = solve_by_features([view], gather_features([view], generic), generic, options)
     problems = {
-        other.photo.name: ONE_SIDE.format(view.photo.name)
+        other.photo.name: SAME_SIDE.format(view.photo.name)
         for other in solution.views
         if other is not view
     }
@@ -126,34 +129,34 @@ def _all_photos(
 
 
 def _from_one_side(cameras: Sequence[Camera]) -> bool:
-    """Whether nothing tells depth: neither another side nor another distance."""
+    """Whether depth is undetermined: neither another side nor another distance."""
     distance = np.array([float(camera.t_cam_head[2]) for camera in cameras])
-    near = distance.max() / distance.min() < NEARER_TELLS
-    return bool(near) and view_spread(cameras) < ONE_SIDE_DEG
+    near = distance.max() / distance.min() < MIN_DISTANCE_RATIO
+    return bool(near) and largest_view_angle(cameras) < MIN_VIEW_ANGLE_DEG
 
 
-def _guided(solution: Solution, generic: GenericHead) -> Solution:
+def _with_aligned_features(solution: Solution, generic: GenericHead) -> Solution:
     """The solution with eyelids and lips where landmarks show them."""
     features, cameras = solution.features, solution.cameras
-    vertices = guide_features(
+    vertices = align_features(
         solution.vertices, features, cameras, generic, measured=bool(solution.matches)
     )
     residuals = residuals_of(features, cameras, vertices)
     return replace(solution, vertices=vertices, residuals=residuals)
 
 
-def _misfit(
+def _outlier_photo(
     solution: Solution, generic: GenericHead, options: FitOptions
 ) -> tuple[int, str] | None:
     """The photo to leave out, if any, and why."""
-    typical = solution.typical_misfits
-    if len(typical) < 2 or typical.min() < HOPELESS_SIGMAS:
-        return find_misfit(typical)
+    typical = solution.median_normalized_residuals
+    if len(typical) < 2 or typical.min() < INCONSISTENT_SIGMAS:
+        return find_outlier_photo(typical)
     # Together they make no head at all: the one to blame makes none by itself either.
     alone = [
         solve_by_features(
             [view], gather_features([view], generic), generic, options
-        ).typical_misfits[0]
+        ).median_normalized_residuals[0]
         for view in solution.views
     ]
     worst = int(np.argmax(alone))

@@ -14,11 +14,11 @@ from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.reconstruction.bundle.adjustment import Adjustment, FocalPrior, ShapePrior, adjust_bundle
 from mien.reconstruction.features import Features, image_points_for_cameras, rematch_curves
-from mien.reconstruction.outliers import typical_misfits
+from mien.reconstruction.outliers import median_normalized_residuals
 from mien.reconstruction.pose.recovery import recover_pose
 from mien.reconstruction.shape.deformation import vertex_uncertainty
 from mien.reconstruction.shape.from_features import shape_from_features
-from mien.reconstruction.triangulation import intersect_rays
+from mien.reconstruction.triangulation import triangulate
 
 FOCAL_PRIOR_DIAGONALS = 1.7
 """Without EXIF: a focal length between a phone's (0.6 diagonals) and a cropped portrait's (3.5)."""
@@ -29,7 +29,7 @@ NAMED_SIGMA_MM = 2.0
 faces and between people who mark them (docs/method/cameras.md)."""
 ATTACHED_SIGMA_MM = 1.5
 """The same for a landmark: the detector that finds it also attached it to the generic head."""
-NEAREST_MM = 150.0
+MIN_DISTANCE_MM = 150.0
 """No photo of a face is taken from nearer to the eyes; a camera there is a solver gone astray."""
 PRIOR_DEVIATION_MM = 2.5
 """How far the generic head lies from a person's where no photo tells."""
@@ -75,11 +75,11 @@ class Solution:
     matches: tuple[tuple[int, float], ...] = ()
 
     @property
-    def typical_misfits(self) -> Float[Array, " k"]:
+    def median_normalized_residuals(self) -> Float[Array, " k"]:
         """(K,) how many expected errors each photo's marks lie off, in the median."""
-        typical = typical_misfits(self.residuals, self.features.sigma_px(self.cameras))
+        typical = median_normalized_residuals(self.residuals, self.features.sigma_px(self.cameras))
         distance = np.array([camera.t_cam_head[2] for camera in self.cameras])
-        return np.where(distance < NEAREST_MM, np.inf, typical)
+        return np.where(distance < MIN_DISTANCE_MM, np.inf, typical)
 
 
 def solve_by_features(
@@ -102,7 +102,7 @@ def solve_by_features(
     keep = np.array([not text for text in start.problems])
     views = [view for view in views if view.photo.name not in problems]
     cameras = tuple(camera for camera in start.cameras if camera is not None)
-    points = start.points[features.seen[keep].any(axis=0)]
+    points = start.points[features.observed[keep].any(axis=0)]
     features = features.of_photos(keep)
     vertices = generic.mesh.vertices
     for _ in range(options.rounds):
@@ -139,7 +139,7 @@ def _adjust(
         cameras,
         points,
         features.image_points,
-        sigma_px=np.where(features.seen, features.sigma_px(cameras), 1.0),
+        sigma_px=np.where(features.observed, features.sigma_px(cameras), 1.0),
         loss="cauchy",
         shape_prior=prior,
         focal_prior=focal_priors(views),
@@ -152,8 +152,8 @@ def _intersect(
 ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
     """[Pighin 2002] sec. 5.1.3: the features where their rays meet, and how far those miss."""
     weights = 1 / features.sigma_mm**2
-    rays = intersect_rays(cameras, features.image_points, weights=weights, current=places)
-    return rays.points, np.where(rays.solved, rays.residual_mm, PRIOR_DEVIATION_MM)
+    rays = triangulate(cameras, features.image_points, weights=weights, current=places)
+    return rays.points, np.where(rays.determined, rays.residual_mm, PRIOR_DEVIATION_MM)
 
 
 def focal_priors(views: Sequence[CapturedView]) -> FocalPrior:

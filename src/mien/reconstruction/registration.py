@@ -18,29 +18,29 @@ from mien.reconstruction.bundle.problem import FocalGroups
 from mien.reconstruction.dense.register import (
     SCALES_MM,
     Registration,
-    deviation_by_features,
+    deviation_from_features,
     register_views,
 )
 from mien.reconstruction.features import gather_features
 from mien.reconstruction.landmark_fit import Solution, focal_groups, focal_priors, residuals_of
-from mien.reconstruction.localization.localizer import place_views
+from mien.reconstruction.localization.localizer import localize_views
 
 NOTHING_SHARED = (
     "the photos share too little skin to be registered with each other: cameras and shape rest on "
     "marks and landmarks alone, which leaves cameras 5 to 15 degrees off where nothing was marked "
     "by hand"
 )
-FAR_TURN_DEG = 25.0
+MAX_ROTATION_DEG = 25.0
 """Landmarks leave cameras up to 16 degrees off."""
-CONTRADICTED = (
+INCONSISTENT_REGISTRATION = (
     "the photos could not be registered with each other (what would follow contradicts the "
     "landmarks, as where all look from nearly one side): cameras and shape rest on marks and "
     "landmarks alone"
 )
-MOST_MISFIT = 1.5
+MAX_EDGE_RESIDUAL = 1.5
 """Expected errors by which the landmarks on edges lie off in the median. Registered heads have 0.4
 to 0.7; one that has followed noise had 2.4."""
-NOT_PLACED = "no face was found in it, and it does not look like the head that the others show"
+NOT_LOCALIZED = "no face was found in it, and it does not look like the head that the others show"
 
 
 def register_solution(
@@ -49,20 +49,22 @@ def register_solution(
     generic: GenericHead,
     progress: StepProgress | None = None,
 ) -> Solution:
-    """The solution by all the skin that its photos share, with the photos placed by it added.
+    """The solution by all the skin that its photos share, with the photos localized by it added.
 
     Args:
         solution: from marks and landmarks.
         faceless: photos of the same expression in which nothing is marked.
+        generic: the generic head.
+        progress: called with steps done and their total.
     """
     solution = _registered(solution, generic, SCALES_MM, progress)
     if not faceless:
         return solution
     known = list(zip(solution.views, solution.cameras, strict=True))
-    cameras = place_views(faceless, known, solution.vertices, generic)
+    cameras = localize_views(faceless, known, solution.vertices, generic)
     placed = [(view, camera) for view, camera in zip(faceless, cameras, strict=True) if camera]
     missing = {
-        view.photo.name: NOT_PLACED
+        view.photo.name: NOT_LOCALIZED
         for view, camera in zip(faceless, cameras, strict=True)
         if camera is None
     }
@@ -76,7 +78,7 @@ def register_solution(
             cameras=added,
             residuals=residuals_of(features, added, solution.vertices),
         )
-        # The others are where they belong: the closer looks are enough.
+        # The others are registered already: the finer scales are enough.
         solution = _registered(wider, generic, SCALES_MM[2:], progress)
     return replace(solution, problems=solution.problems | missing)
 
@@ -101,11 +103,13 @@ def _registered(
                 "cameras and shape rest on marks and landmarks alone",
             )
     if found is None:
-        return replace(solution, uncertainty_mm=deviation_by_features(*known), notes=notes)
+        return replace(solution, uncertainty_mm=deviation_from_features(*known), notes=notes)
     residuals = residuals_of(solution.features, found.cameras, found.vertices)
-    if _edge_misfit(solution, found, residuals) > MOST_MISFIT:
+    if _edge_residual(solution, found, residuals) > MAX_EDGE_RESIDUAL:
         return replace(
-            solution, uncertainty_mm=deviation_by_features(*known), notes=(CONTRADICTED,)
+            solution,
+            uncertainty_mm=deviation_from_features(*known),
+            notes=(INCONSISTENT_REGISTRATION,),
         )
     quality = found.quality
     names = [view.photo.name for view in views]
@@ -120,15 +124,12 @@ def _registered(
     )
 
 
-def _edge_misfit(
+def _edge_residual(
     solution: Solution, found: Registration, residuals: Float[Array, "k n 2"]
 ) -> float:
-    """How many expected errors the landmarks on edges lie off the registered head's, in the median;
-
-    0 without landmarks.
-    """
+    """Median normalized residual of the landmarks on edges; 0 without landmarks."""
     features = solution.features
-    used = features.seen & features.on_edges
+    used = features.observed & features.on_edges
     if not used.any():
         return 0.0
     off = np.linalg.norm(residuals, axis=2)[used] / features.sigma_px(found.cameras)[used]
@@ -149,7 +150,7 @@ def _far_turned(
         f"{name}: was turned by {degrees:.0f} degrees from where landmarks put it; see whether the "
         "mesh lies on the face"
         for name, degrees in zip(names, turned, strict=True)
-        if degrees > FAR_TURN_DEG
+        if degrees > MAX_ROTATION_DEG
     )
 
 

@@ -12,11 +12,11 @@ from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.reconstruction.features import Features
 
-LEAST_FEATURES = 4
+MIN_FEATURES = 4
 """With fewer, several cameras would do."""
 
 
-def place_cameras(
+def resect_cameras(
     views: Sequence[CapturedView],
     features: Features,
     focal_px: Float[Array, " k"],
@@ -25,6 +25,7 @@ def place_cameras(
     """Where each photo was taken from, by where it shows the features of a head.
 
     Args:
+        views: K photos.
         features: of the same K photos.
         focal_px: (K,).
         vertices: (V, 3) mm.
@@ -32,30 +33,32 @@ def place_cameras(
     Raises:
         EstimationError: fewer than four features in a photo, or no camera that sees them so.
     """
-    places = features.on(vertices)
+    points = features.on(vertices)
     return tuple(
-        _place(view, places[seen], image[seen], focal)
+        _resect(view, points[seen], image[seen], focal)
         for view, seen, image, focal in zip(
-            views, features.seen, features.image_points, focal_px.tolist(), strict=True
+            views, features.observed, features.image_points, focal_px.tolist(), strict=True
         )
     )
 
 
-def _place(
-    view: CapturedView, places: Float[Array, "n 3"], image: Float[Array, "n 2"], focal_px: float
+def _resect(
+    view: CapturedView, points: Float[Array, "n 3"], image: Float[Array, "n 2"], focal_px: float
 ) -> Camera:
     import cv2
 
-    if len(places) < LEAST_FEATURES:
-        raise EstimationError(f"{view.photo.name}: {len(places)} points are too few for a camera")
+    if len(points) < MIN_FEATURES:
+        raise EstimationError(f"{view.photo.name}: {len(points)} points are too few for a camera")
     width, height = view.photo.size
     centred = image - [width / 2, height / 2]
-    lens = np.diag([focal_px, focal_px, 1.0])
+    intrinsics = np.diag([focal_px, focal_px, 1.0])
     try:
-        solved, turn, shift = cv2.solvePnP(places, centred, lens, None, flags=cv2.SOLVEPNP_SQPNP)
+        solved, rotation_vector, translation = cv2.solvePnP(
+            points, centred, intrinsics, None, flags=cv2.SOLVEPNP_SQPNP
+        )
     except cv2.error:  # Points that lie in one place.
         solved = False
-    if not solved or shift[2, 0] <= 0:
+    if not solved or translation[2, 0] <= 0:
         raise EstimationError(f"{view.photo.name}: no camera sees its points so")
-    rotation, _ = cv2.Rodrigues(turn)
-    return Camera(width, height, focal_px, rotation, shift.ravel())
+    rotation, _ = cv2.Rodrigues(rotation_vector)
+    return Camera(width, height, focal_px, rotation, translation.ravel())

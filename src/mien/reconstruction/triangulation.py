@@ -11,36 +11,36 @@ from mien.arrays import Array, Bool, Float, Int, check_array, check_positive
 from mien.camera import Camera
 from mien.errors import InputError
 
-__all__ = ["RayIntersections", "intersect_rays"]
+__all__ = ["Triangulation", "triangulate"]
 
 
 @dataclass(frozen=True)
-class RayIntersections:
-    """Where viewing rays meet.
+class Triangulation:
+    """Points triangulated from viewing rays.
 
     Attributes:
-        points: (N, 3) mm, head space; NaN where the rays do not tell.
-        solved: (N,) True where at least two rays meet under a fair angle.
+        points: (N, 3) mm, head space; NaN where the rays leave them open.
+        determined: (N,) True where at least two rays meet under a fair angle.
         residual_mm: (N,) root mean square distance from the point to its rays; NaN without rays.
         angle: (N,) radians, the largest angle between two of the rays; 0 with fewer than two.
         views: (N,) number of rays.
     """
 
     points: Float[Array, "n 3"]
-    solved: Bool[Array, " n"]
+    determined: Bool[Array, " n"]
     residual_mm: Float[Array, " n"]
     angle: Float[Array, " n"]
     views: Int[Array, " n"]
 
 
-def intersect_rays(
+def triangulate(
     cameras: Sequence[Camera],
     image_points: Float[Array, "k n 2"],
     *,
     weights: Float[Array, "k n"] | None = None,
     current: Float[Array, "n 3"] | None = None,
     min_angle: float = np.deg2rad(2.0),
-) -> RayIntersections:
+) -> Triangulation:
     """The points nearest to their viewing rays in the least-squares sense.
 
     Args:
@@ -78,7 +78,7 @@ def intersect_rays(
     off = np.einsum("knij,knj->kni", across, points - centers[:, None])
     total = np.where(views > 0, weights.sum(axis=0), np.nan)
     residual = np.sqrt(np.einsum("kn,kni,kni->n", weights, off, off) / total)
-    return RayIntersections(points, solved, residual, angle, views)
+    return Triangulation(points, solved, residual, angle, views)
 
 
 def _ray_weights(image: Array, weights: Array | None) -> Float[Array, "k n"]:

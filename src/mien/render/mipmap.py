@@ -1,4 +1,4 @@
-"""Textures looked up through a pyramid, so that what is seen small does not flicker."""
+"""Mipmaps: texture pyramids and trilinear lookups in them."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from mien.arrays import Array, Float, Int, UInt8, check_image, frozen
 from mien.errors import InputError
 from mien.numeric.kernels.jit import njit
 
-# A texel's three channels are weighted by one multiplication: each has 21 of 64 bits to itself, 8
-# for the colour and 13 for the weight.
+# A texel's three channels are weighted by one multiplication: each has 21 of 64 bits, 8 for the
+# colour and 13 for the weight.
 UNIT = 8192
 
 Four = tuple[np.uint64, ...]
-"""Places of four texels, then their weights in the same order."""
+"""Indices of four texels, then their weights in the same order."""
 
 
 class Pyramids(NamedTuple):
@@ -24,9 +24,9 @@ class Pyramids(NamedTuple):
 
     Attributes:
         texels: (K, N) uint32, red in the lowest byte; level after level, row after row.
-        widths: (L,) each level's size and its first texel.
-        heights: (L,) each level's size and its first texel.
-        starts: (L,) each level's size and its first texel.
+        widths: (L,) of each level.
+        heights: (L,) of each level.
+        starts: (L,) first texel of each level.
     """
 
     texels: Int[Array, "k n"]
@@ -73,7 +73,7 @@ def packed_texels(level: UInt8[Array, "h w 3"]) -> Int[Array, " n"]:
 
 
 def texel_areas(uvs: Float[Array, "f 3 2"], pyramids: Pyramids) -> Float[Array, " f"]:
-    """(F,) how many texels of the finest level the triangles with these corners cover."""
+    """(F,) areas of triangles with these corners in texels of the finest level."""
     corners = uvs * [pyramids.widths[0], pyramids.heights[0]]
     b, c = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return np.abs(b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]) / 2
@@ -86,7 +86,8 @@ def level_of_detail(
 
     Args:
         texels: (F,) of texel_areas.
-        points: (V, 2) samples' widths.
+        points: (V, 2) in samples.
+        triangles: (F, 3) vertex indices.
     """
     detail = np.empty(len(points), np.float32)
     _level_of_detail(texels, points, triangles, detail)
@@ -112,10 +113,10 @@ def _level_of_detail(texels: Array, points: Array, triangles: Array, detail: Arr
 
 @njit(inline="always")
 def place_lookup(pyramids: Pyramids, u: float, v: float, level: float) -> tuple[Four, Four]:
-    """Which texels make the colour at (u, v), and their weights: the same in every texture.
+    """Texels and weights of the colour at (u, v), the same in every texture.
 
-    Trilinear: bilinear in the two levels that come nearest to one texel a sample. u goes around,
-    v points up and ends at the image's edge.
+    Trilinear: bilinear in the two levels nearest to one texel a sample. u is periodic; v points up
+    and is clamped.
 
     Returns:
         four in the finer and four in the coarser level.
@@ -140,7 +141,7 @@ def _place_in_level(pyramids: Pyramids, level: int, u: float, v: float, share: i
     left = x0 if x0 >= 0 else width - 1
     right = x0 + 1 if x0 + 1 < width else 0
     above, below = start + y0 * width, start + min(y0 + 1, height - 1) * width
-    # Rounded so that they sum to the share: a plain texture keeps its colour.
+    # Rounded so that they sum to the share: a texture of one colour keeps it.
     lower = int(share * (y - y0) + 0.5)
     upper_right = int((share - lower) * (x - x0) + 0.5)
     lower_right = int(lower * (x - x0) + 0.5)

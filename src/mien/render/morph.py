@@ -1,4 +1,4 @@
-"""A face that mixes several textures, drawn in one pass ([Pighin 2002] sec. 6.1, eq. 5)."""
+"""Pictures of a posed face whose textures are blended ([Pighin 2002] sec. 6.1, eq. 5)."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from mien.camera import Camera
 from mien.errors import InputError
 from mien.mesh import Mesh
 from mien.render.mipmap import build_pyramids
-from mien.render.mix import draw_mix, prepare_painted
+from mien.render.multitexture import draw_multitextured, prepare_textured_mesh
 from mien.render.projection import samples_across
 from mien.render.shade import over_background, shown_parts
 from mien.rig.state import PosedFace
 
 
 class MorphRenderer:
-    """Draws faces of one head; everything that does not change between them is prepared once.
+    """Draws posed faces of one head; what does not depend on the pose is prepared once.
 
     Args:
         mesh: the head's topology, texture coordinates and parts; its vertices do not matter.
@@ -36,7 +36,7 @@ class MorphRenderer:
         parts: tuple[str, ...] | None = None,
     ) -> None:
         shown = mesh.submesh(mesh.triangles_of(*(shown_parts(mesh) if parts is None else parts)))
-        self._painted = prepare_painted(shown, build_pyramids(textures))
+        self._mesh = prepare_textured_mesh(shown, build_pyramids(textures))
         self._shape = (len(mesh.vertices), len(textures))
 
     def render(
@@ -49,10 +49,12 @@ class MorphRenderer:
     ) -> UInt8[Array, "h w 4"]:
         """(H, W, 4) uint8 sRGB with straight alpha, as the camera sees the face.
 
-        Every pixel mixes the textures by weights interpolated from the vertices, unclamped until
-        its colour is whole, times the brightness.
+        Every pixel blends the textures by weights interpolated from the vertices, times the
+        brightness; only the result is clamped.
 
         Args:
+            face: with weights of the renderer's textures.
+            camera: of the picture.
             samples: per pixel, 1, 4 or 9: more make smooth edges; within a triangle the textures
                 are looked up once a pixel.
             background: a colour or an image; alpha is then 255 everywhere.
@@ -66,5 +68,5 @@ class MorphRenderer:
             found = f"shape {face.weights.shape}"
             raise InputError("face", f"weights of shape {self._shape}", found)
         weights, brightness = face.weights, face.brightness
-        image = draw_mix(self._painted, face.vertices, weights, brightness, camera, factor)
+        image = draw_multitextured(self._mesh, face.vertices, weights, brightness, camera, factor)
         return image if background is None else over_background(image, background)

@@ -7,11 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from mien.arrays import Array, Float, check_array, check_positive
-from mien.camera import Camera
+from mien.camera import FRONTAL, Camera
 from mien.errors import InputError
-
-# Head space (x to the subject's left, y up, z out of the face) as a camera before the face sees it.
-_FRONT = np.diag([1.0, -1.0, -1.0])
 
 
 def orbit_camera(
@@ -25,15 +22,15 @@ def orbit_camera(
     fov: float = np.radians(18),
     margin: float = 0.06,
 ) -> Camera:
-    """A camera that sees all the vertices, the middle of the box around them in its own middle.
+    """A camera that sees all vertices, with the middle of their bounding box in its centre.
 
     Args:
         yaw: radians; positive sees more of the subject's left side.
         pitch: radians; positive looks down from above.
-        roll: radians; positive turns the camera so that the head seems to turn counter-clockwise.
+        roll: radians; positive turns the head counter-clockwise in the picture.
         width: px.
         height: px.
-        vertices: (V, 3) mm; the same for all cameras of a turn, so that the head keeps its size.
+        vertices: (V, 3) mm; the same for all cameras of an orbit, so that the scale is constant.
         fov: radians over the image's longer side; the default is a portrait lens.
         margin: share of the image that stays free on every side.
 
@@ -60,7 +57,7 @@ def orbit_camera(
     focal = max(width, height) / 2 / np.tan(fov / 2)
     free = (0.5 - margin) * np.array([width, height])
     distance = max(float((across * focal / free).max()), 1e-3) + towards
-    rotation = _FRONT @ _turn_head(yaw, pitch)
+    rotation = FRONTAL @ _turn_head(yaw, pitch)
     rotation = _about_z(-roll) @ rotation
     position = np.array([0.0, 0.0, distance]) - rotation @ middle
     return Camera(width, height, float(focal), rotation, position)
@@ -75,7 +72,15 @@ def turntable(
     pitch: float = 0.0,
     fov: float = np.radians(18),
 ) -> Iterator[Camera]:
-    """Cameras once around the head, starting in front; the last frame leads back to the first.
+    """Cameras once around the head, starting in front, as a loop.
+
+    Args:
+        frames: number of cameras.
+        width: px.
+        height: px.
+        vertices: (V, 3) mm, as for orbit_camera.
+        pitch: radians, as for orbit_camera.
+        fov: radians, as for orbit_camera.
 
     Raises:
         InputError: as orbit_camera; fewer than one frame.
@@ -87,7 +92,7 @@ def turntable(
 
 
 def _turn_head(yaw: float, pitch: float) -> Float[Array, "3 3"]:
-    """Rotation of the head that shows a fixed camera what one at yaw and pitch would see."""
+    """Rotation of the head equivalent to moving the camera by yaw and pitch."""
     c, s = np.cos(yaw), np.sin(yaw)
     about_y = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
     c, s = np.cos(pitch), np.sin(pitch)

@@ -27,6 +27,9 @@ def overlay_mesh(
     """The photo with the mesh's visible edges as thin lines over it.
 
     Args:
+        photo: (H, W, 3).
+        mesh: to be drawn.
+        camera: of the photo.
         parts: names of the parts to draw; by default those that pictures show.
         colour: sRGB of the lines.
         opacity: from 0 to 1.
@@ -69,7 +72,7 @@ def draw_points(
 
 
 def _visible_edges(mesh: Mesh, camera: Camera) -> Int[Array, "e 2"]:
-    """Vertex pairs, each once, of the triangles that the camera sees some of from in front."""
+    """Vertex pairs, each once, of visible triangles that face the camera."""
     raster = rasterize_mesh(mesh, camera)
     seen = np.unique(raster.triangle_ids[raster.mask])
     facing = camera.center - mesh.vertices[mesh.triangles[seen, 0]]

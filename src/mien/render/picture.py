@@ -23,11 +23,11 @@ GREY = (72, 74, 84)
 
 
 class HeadRenderer:
-    """Draws one head in any state; what all its pictures share is prepared once.
+    """Draws one head in any state; what does not depend on the state is prepared once.
 
     Attributes:
         head: the head.
-        rig: what poses its face; one that is there already may be given.
+        rig: poses its face; made from the head unless given.
 
     Raises:
         InputError: as Rig.
@@ -63,7 +63,16 @@ class HeadRenderer:
         *,
         background: tuple[int, int, int] | UInt8[Array, "h w 3"] | None = None,
     ) -> UInt8[Array, "h w 4"]:
-        """(H, W, 4) sRGB with straight alpha. Raises: InputError: what the head cannot do."""
+        """(H, W, 4) sRGB with straight alpha.
+
+        Args:
+            state: expressions, units and gaze.
+            camera: of the picture.
+            background: a colour or an image; transparent unless given.
+
+        Raises:
+            InputError: an unknown region, expression or unit, weights out of range.
+        """
         return self.draw_posed(self.rig.evaluate(state), camera, background=background)
 
     def draw_posed(
@@ -73,7 +82,7 @@ class HeadRenderer:
         *,
         background: tuple[int, int, int] | UInt8[Array, "h w 3"] | None = None,
     ) -> UInt8[Array, "h w 4"]:
-        """The same of a face that the rig has posed."""
+        """As draw, of a face that the rig has posed."""
         return self._renderer.render(face, camera, samples=4, background=background)
 
 
@@ -92,13 +101,13 @@ def render_head(
 
     Args:
         head: the head, or a HeadRenderer of it, which is faster for many pictures.
-        yaw: radians, as docs/reference/conventions.md says.
-        pitch: radians, as docs/reference/conventions.md says.
-        roll: radians, as docs/reference/conventions.md says.
+        yaw: radians (docs/reference/conventions.md).
+        pitch: radians.
+        roll: radians.
         size: width and height in px; with `photo`, the photo's own.
-        photo: reproduce the view of this photo instead of turning the head: its camera and, unless
-            the state says which expressions to mix, the expression that it belongs to.
-        state: what the face does; nothing by default.
+        photo: use the camera of this photo instead of the angles, and its expression unless the
+            state has expressions.
+        state: of the face; neutral by default.
         background: sRGB; transparent unless given.
 
     Raises:
@@ -127,7 +136,14 @@ def turntable_frames(
     size: tuple[int, int] = (400, 500),
     background: tuple[int, int, int] = GREY,
 ) -> Iterator[UInt8[Array, "h w 3"]]:
-    """The head once around, one picture at a time."""
+    """The head once around, one picture at a time.
+
+    Args:
+        head: to be drawn.
+        frames: number of pictures.
+        size: width and height in px.
+        background: sRGB.
+    """
     renderer, (width, height) = HeadRenderer(head), size
     for camera in turntable(frames, width=width, height=height, vertices=head.mesh.vertices):
         picture = renderer.draw(FaceState(), camera, background=background)

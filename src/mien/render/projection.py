@@ -1,4 +1,4 @@
-"""Where a camera's samples see vertices."""
+"""Supersampling, and projection of vertices that may lie in the camera's plane."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ SAMPLES = (1, 4, 9)
 
 
 def samples_across(samples: int) -> int:
-    """Along a pixel's side. Raises: InputError: not 1, 4 or 9."""
+    """Samples along the side of a pixel.
+
+    Raises:
+        InputError: not 1, 4 or 9.
+    """
     if samples not in SAMPLES:
         raise InputError("samples", " or ".join(map(str, SAMPLES)), samples)
     return int(np.sqrt(samples))

@@ -14,20 +14,20 @@ from mien.numeric.kernels.jit import njit
 from mien.numeric.kernels.threads import for_row_bands
 from mien.numeric.raster.rasterizer import Raster, interpolate, rasterize
 from mien.render.mipmap import build_pyramids
-from mien.render.mix import draw_mix, prepare_painted
+from mien.render.multitexture import draw_multitextured, prepare_textured_mesh
 from mien.render.projection import project_safely, samples_across
 
 
 @dataclass(frozen=True)
 class Light:
-    """Diffuse light on an untextured head: a key, a weaker fill, and what comes from everywhere.
+    """Diffuse light on an untextured head: a key light, a weaker fill light and ambient light.
 
     Attributes:
-        key: (3,) directions towards the lights in camera space (x right, y down, z forward).
+        key: (3,) direction towards the light in camera space (x right, y down, z forward).
         fill: as `key`.
-        key_strength: their sum is the brightest that a surface can be.
-        fill_strength: their sum is the brightest that a surface can be.
-        ambient: their sum is the brightest that a surface can be.
+        key_strength: the sum of the three strengths is the highest brightness of a surface.
+        fill_strength: as `key_strength`.
+        ambient: as `key_strength`.
     """
 
     key: tuple[float, float, float] = (-0.5, -0.6, -1.0)
@@ -37,7 +37,7 @@ class Light:
     ambient: float = 0.2
 
 
-# What an artist's clay looks like; a face detector finds a face in it, too.
+# Colour of modelling clay; a face detector finds a face in it, too.
 CLAY = (205.0, 172.0, 152.0)
 
 
@@ -55,12 +55,14 @@ def render(
     """(H, W, 4) uint8 sRGB with straight alpha, as the camera sees the mesh.
 
     Args:
-        texture: by the mesh's texture coordinates; filtered where it is seen smaller than it is.
-        vertex_colours: (V, 3) from 0 to 255 instead; with neither, the head is of clay.
+        mesh: to be drawn.
+        camera: of the picture.
+        texture: by the mesh's texture coordinates; filtered where it is minified.
+        vertex_colours: (V, 3) from 0 to 255 instead; with neither, the colour is that of clay.
         parts: names of the parts to show; by default all but the hair cap and the lashes.
         samples: per pixel, 1, 4 or 9: more make smooth edges.
-        light: shades the head; by default one of clay, and photographed colours as they are, since
-            photos have their light in them.
+        light: shades the head; by default only a head of clay is shaded, since photographed colours
+            contain light already.
         background: a colour or an image; alpha is then 255 everywhere.
 
     Raises:
@@ -84,8 +86,10 @@ def _textured(
     brightness = np.ones(count)
     if light is not None:
         brightness = _brightness(mesh.vertex_normals() @ camera.R_cam_head.T, light)
-    surface = prepare_painted(mesh, build_pyramids([texture]))
-    return draw_mix(surface, mesh.vertices, np.ones((count, 1)), brightness, camera, factor)
+    surface = prepare_textured_mesh(mesh, build_pyramids([texture]))
+    return draw_multitextured(
+        surface, mesh.vertices, np.ones((count, 1)), brightness, camera, factor
+    )
 
 
 def _coloured(
@@ -106,10 +110,7 @@ def _coloured(
 
 
 def shown_parts(mesh: Mesh) -> tuple[str, ...]:
-    """The parts that pictures show by default: not the hair cap, a helper, and not the lashes,
-
-    which are opaque sheets.
-    """
+    """The parts that pictures show by default: all but the hair cap and the opaque lashes."""
     return tuple(name for name in mesh.part_names if name not in ("hair", "lashes"))
 
 
@@ -122,7 +123,11 @@ def rasterize_mesh(mesh: Mesh, camera: Camera, *, cull: bool = False) -> Raster:
 def over_background(
     image: UInt8[Array, "h w 4"], background: tuple[int, int, int] | UInt8[Array, "h w 3"]
 ) -> UInt8[Array, "h w 4"]:
-    """The image over a colour or another image, opaque. Raises: InputError: sizes that differ."""
+    """The image over a colour or another image, opaque.
+
+    Raises:
+        InputError: sizes that differ.
+    """
     below = np.asarray(background)
     if below.shape not in ((3,), (*image.shape[:2], 3)):
         expected = f"a colour or an image of {image.shape[1]}x{image.shape[0]} px"
@@ -146,7 +151,7 @@ def _mix_rows(above: Array, below: Array, first: int, end: int, mixed: Array) ->
 
 
 def _brightness(normals: Float[Array, "*n 3"], light: Light) -> Float[Array, "*n"]:
-    """By Lambert's law, from normals in camera space; a surface's back is lit like its front."""
+    """Lambertian shading from normals in camera space; back faces are lit like front faces."""
     normals = normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-6)
     normals = normals * np.where(normals[..., 2:] > 0, -1, 1)
     brightness = np.full(normals.shape[:-1], light.ambient, np.float32)

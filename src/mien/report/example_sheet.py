@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from mien.arrays import Array, UInt8
-from mien.report.sheet import arranged
-from mien.report.track.caption import write_on
+from mien.report.sheet import arrange_grid
+from mien.report.track.caption import draw_text
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
 _CELL = (240, 300)
@@ -33,7 +33,7 @@ def example_sheet(
     for index, example in enumerate(example_set.examples):
         reason = why.get(example.name, "") + ", shows teeth" * (index in example_set.teeth)
         cells.append(np.concatenate([_face(example), _caption(example.name, reason)]))
-    return arranged(cells, columns)
+    return arrange_grid(cells, columns)
 
 
 def _face(example: Example) -> UInt8[Array, "h w 3"]:
@@ -59,5 +59,5 @@ def _caption(name: str, reason: str) -> UInt8[Array, "h w 3"]:
     for number, line in enumerate(lines):
         at = (0.5, (1.35 * _FONT_SIZE * (number + 0.5) + 3) / height)
         colour = _LIGHT_INK if number else _INK
-        strip = write_on(strip, line, colour, at=at, size=_FONT_SIZE)
+        strip = draw_text(strip, line, colour, at=at, size=_FONT_SIZE)
     return strip

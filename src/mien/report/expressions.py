@@ -1,4 +1,4 @@
-"""What a report shows of a head's expressions: each beside its photo, and mixed by region."""
+"""Expressions in a report: each beside its photo, and mixed by region."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ MIXTURES = {
     "around the eyes": {"eyes": 1.0},
     "in the forehead": {"forehead": 1.0},
 }
-"""Weights of an expression by region, by what the report calls them."""
+"""Weights of an expression by region, by their captions in the report."""
 _HEIGHT = 420
 _MARGIN = 0.04
 
 
 def count_expressions(head: Head) -> int:
-    """Expressions that a report shows; none for a head of neutral alone."""
+    """Number of expressions that a report shows; 0 for a head with neutral alone."""
     return len(head.expressions) if len(head.expressions) > 1 else 0
 
 
@@ -41,8 +41,9 @@ def expression_rows(
     """For each expression its photo, its picture from that camera, and mixtures with neutral.
 
     Args:
+        head: with at least one expression besides neutral; else there are no rows.
         photos: pixels by name.
-        progress: told how many expressions are done.
+        progress: called with the number of expressions done.
     """
     if not count_expressions(head):
         return []
@@ -59,14 +60,14 @@ def expression_rows(
 def expression_psnr(
     renderer: HeadRenderer, name: str, view: FittedView, photo: UInt8[Array, "h w 3"]
 ) -> tuple[float, UInt8[Array, "h w 4"]]:
-    """How near an expression, seen by its own camera, comes to its photo over the face, dB.
+    """PSNR in dB over the face between an expression's rendering and its photo; the rendering.
 
-    Colours are taken back to the photo's own exposure. Also gives the picture.
+    Colours are converted to the photo's exposure.
     """
     picture = renderer.draw(FaceState({FACE: {name: 1.0}}), view.camera)
     colours = np.clip(np.rint(picture[..., :3] / view.gains), 0, 255).astype(np.uint8)
     picture = np.concatenate([colours, picture[..., 3:]], axis=2)
-    # At the head's outline the photo has something else in its pixels.
+    # Pixels at the head's outline also show the background.
     inside = _face_pixels(renderer.head, name, view.camera) & (picture[..., 3] == 255)
     return face_psnr(photo, picture, inside), picture
 
@@ -101,20 +102,20 @@ def _mixtures(
 
 
 def _face_pixels(head: Head, name: str, camera: Camera) -> Bool[Array, "h w"]:
-    """Where the camera sees the face, not the rest of the head."""
+    """Mask of the face, without the rest of the head."""
     grey = np.where(load_generic_head().regions["face"] > 0.5, 255.0, 0.0)
     colours = np.repeat(grey[:, None], 3, axis=1)
-    seen = render(head.expression_mesh(name), camera, vertex_colours=colours)
-    return (seen[..., 0] > 200) & (seen[..., 3] > 0)
+    image = render(head.expression_mesh(name), camera, vertex_colours=colours)
+    return (image[..., 0] > 200) & (image[..., 3] > 0)
 
 
 def _facing(camera: Camera) -> float:
-    """1 for a camera that the face looks at, less for one from the side."""
+    """Cosine between the face and the direction to the camera."""
     return float(-camera.R_cam_head[2, 2])
 
 
 def _box(mask: Bool[Array, "h w"]) -> tuple[slice, slice]:
-    """The part of a picture that holds the head, and a little more."""
+    """Bounding box of the head with a margin."""
     sides = []
     for axis, length in enumerate(mask.shape):
         at = np.flatnonzero(mask.any(axis=1 - axis))

@@ -1,4 +1,4 @@
-"""`report.html`: one file, with its pictures inside, that opens anywhere."""
+"""`report.html`: one file that contains its pictures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mien.arrays import Array, Float, UInt8
-from mien.camera import Camera
+from mien.camera import head_angles_deg
 from mien.head import Head
 from mien.progress import StepProgress, no_step_progress
 from mien.reconstruction.result import Fit, Mark, PhotoFit
@@ -26,14 +26,14 @@ from mien.report.pictures import (
 
 @dataclass(frozen=True)
 class ReportInput:
-    """What a report tells about.
+    """Contents of a report.
 
     Attributes:
         head: the result.
         photos: (h, w, 3) pixels by photo name.
-        fits: by expression, with every mark and its residual.
+        fits: by expression, with every observation and its residual.
         coverage: (H, W) summed texture weights in the atlas; 0 where no photo shows the texel.
-        notes: what the user should know.
+        notes: for the user.
         turntable: a video beside the report, or "".
     """
 
@@ -49,7 +49,8 @@ def render_report(data: ReportInput, *, progress: StepProgress = no_step_progres
     """The page's HTML.
 
     Args:
-        progress: told the steps done and their total.
+        data: contents.
+        progress: called with the steps done and their total.
     """
     from jinja2 import Environment, PackageLoader
 
@@ -113,16 +114,3 @@ def _residual(mark: Mark) -> dict[str, Any]:
         "trusted": not mark.rejection,
         "verdict": mark.rejection or ("by hand" if mark.by_hand else "detected"),
     }
-
-
-def head_angles_deg(camera: Camera) -> tuple[float, float, float]:
-    """Degrees of yaw, pitch and roll of the head before the camera (docs/reference/conventions.md).
-
-    The same three angles given to `mien render` show the head turned like that.
-    """
-    # The head's x (subject's left), y (up) and z (out of the face) as the camera has them.
-    left, up, out = camera.R_cam_head.T
-    yaw = np.degrees(np.arctan2(left[2], -out[2]))
-    pitch = np.degrees(np.arcsin(np.clip(-up[2], -1, 1)))
-    roll = np.degrees(np.arctan2(-up[0], -up[1]))
-    return float(yaw), float(pitch), float(roll)

@@ -19,7 +19,7 @@ from mien.render.shade import render
 PREVIEWS = {"front": 0, "left": 45, "left side": 90, "back": 180, "right side": -90, "right": -45}
 _SIDES = ("front", "left side", "back", "right side")
 UNCERTAINTY_LIMITS_MM = (1.0, 10.0)
-"""What the brightest and the darkest colour of the uncertainty stand for."""
+"""Uncertainties that the brightest and the darkest colour stand for."""
 _DARK, _BRIGHT = np.array([60.0, 30.0, 80.0]), np.array([250.0, 220.0, 60.0])
 _SIZE = (360, 450)
 _PHOTO_HEIGHT = 900
@@ -29,19 +29,19 @@ Picture = dict[str, str]
 
 
 def preview_pictures(head: Head) -> list[Picture]:
-    """The head from around."""
+    """The head from several sides."""
     return [_seen_from(head.mesh, head.textures[ATLAS], name) for name in PREVIEWS]
 
 
 def coverage_pictures(head: Head, coverage: Float[Array, "h w"]) -> list[Picture]:
-    """The head coloured by what the photos show: dark where none does, bright where squarely."""
+    """The head coloured by coverage: dark where no photo shows it, bright where seen frontally."""
     share = np.clip(coverage / max(float(np.quantile(coverage, 0.99)), 1e-6), 0, 1)[..., None]
     colours = np.rint(_DARK + share * (_BRIGHT - _DARK)).astype(np.uint8)
     return [_seen_from(head.mesh, colours, name) for name in _SIDES]
 
 
 def uncertainty_pictures(head: Head) -> list[Picture]:
-    """The head coloured by how far it may lie from the truth: bright where it is known well."""
+    """The head coloured by uncertainty: bright where it is small."""
     low, high = UNCERTAINTY_LIMITS_MM
     # Logarithmic: from half to one millimetre matters as much as from five to ten.
     share = np.log(np.clip(head.uncertainty_mm, low, high) / low) / np.log(high / low)
@@ -90,6 +90,6 @@ def _seen_from(
 
 
 def data_uri(image: UInt8[Array, "h w 3"]) -> str:
-    """The picture as the source of an <img>."""
+    """The picture as a data URI, for the source of an <img>."""
     encoded = base64.b64encode(encode_image(image, "JPEG", quality=88)).decode()
     return f"data:image/jpeg;base64,{encoded}"

@@ -9,8 +9,8 @@ from mien.arrays import Array, UInt8
 _GAP = 4
 
 
-def arranged(cells: list[UInt8[Array, "h w 3"]], columns: int) -> UInt8[Array, "h w 3"]:
-    """Cells of one size on a white sheet."""
+def arrange_grid(cells: list[UInt8[Array, "h w 3"]], columns: int) -> UInt8[Array, "h w 3"]:
+    """Cells of one size in rows on a white sheet."""
     height, width, _ = cells[0].shape
     columns = min(columns, len(cells))
     rows = -(-len(cells) // columns)

@@ -14,7 +14,7 @@ from mien.errors import InputError
 from mien.head import Head
 from mien.mesh import Mesh
 from mien.render.mipmap import build_pyramids
-from mien.render.mix import prepare_painted
+from mien.render.multitexture import prepare_textured_mesh
 from mien.rig.basis import WEIGHT_RANGE, Basis
 from mien.rig.rig import Rig, region_rows
 from mien.rig.sparse_offsets import SparseOffsets
@@ -117,7 +117,7 @@ class FaceModel:
         self.basis = Basis.by_gram_schmidt(len(self.rig.names))
         mesh, self.compared = _visible_triangles(head.mesh, load_generic_head().regions)
         self.limits = RangeLimits.of(self.basis, len(regions), len(units))
-        self.painted = prepare_painted(mesh, build_pyramids(self.rig.textures))
+        self.painted = prepare_textured_mesh(mesh, build_pyramids(self.rig.textures))
         self.grey = grey_pyramids(self.painted.pyramids)
         self._masks = np.stack([self.rig.mask(region) for region in regions], axis=1)
         self._rows = region_rows(self.layout.regions)

@@ -14,7 +14,7 @@ from mien.head import Head
 from mien.track.face_model import FaceModel, FaceParameters
 from mien.track.image.colour_gain import ColourGain
 from mien.track.image.drawing import Pose
-from mien.track.landmarks.initialization import Found, Starter
+from mien.track.landmarks.initialization import HeadDetection, HeadDetector
 from mien.track.motion_model import FRAME_SECONDS, motion_prior, parameter_blocks, predict
 from mien.track.parameters import Parameters
 from mien.track.photometric.frame_fit import FrameFitOptions, FrameFitter, FrameSolution
@@ -72,7 +72,7 @@ class Tracker:
         detector: of faces and their landmarks.
         options: of the tracker.
         model: of this head and these units, made here unless given, in a second.
-        starter: of this head and these units, made here unless given, in a second.
+        head_detector: of this head and these units, made here unless given, in a second.
 
     Raises:
         InputError: as Rig.
@@ -88,13 +88,15 @@ class Tracker:
         detector: LandmarkDetector,
         options: TrackOptions | None = None,
         model: FaceModel | None = None,
-        starter: Starter | None = None,
+        head_detector: HeadDetector | None = None,
     ) -> None:
         options = options or TrackOptions()
         self._model = model or FaceModel(head, units=options.units)
         self._fitter = FrameFitter(self._model, options.fit)
         self.layout: Layout = self._model.layout
-        self._starter = starter or Starter(head, self.layout, detector, rig=self._model.rig)
+        self._head_detector = head_detector or HeadDetector(
+            head, self.layout, detector, rig=self._model.rig
+        )
         self._camera = Camera(width, height, focal_px, np.eye(3), np.array([0.0, 0.0, 1000.0]))
         self.met_others = False
         self._past: list[TrackedFrame] = []
@@ -113,7 +115,7 @@ class Tracker:
         pixels: UInt8[Array, "h w 3"],
         frame: int,
         time: float,
-        start: Found | None = None,
+        start: HeadDetection | None = None,
     ) -> TrackedFrame:
         """Head and face in the next frame.
 
@@ -165,7 +167,7 @@ class Tracker:
         Units only deform one texture: without photographed expressions, pictures do not determine
         the opening of a mouth well enough.
         """
-        state = self._starter.find_at(pixels, parameters.pose.t, focal_px=camera.focal_px)
+        state = self._head_detector.detect_near(pixels, parameters.pose.t, focal_px=camera.focal_px)
         return (
             parameters if state is None else replace(parameters, face=self._parameters(state).face)
         )
@@ -182,28 +184,28 @@ class Tracker:
         return replace(fitted, parameters=start.plus(taken))
 
     def _find(
-        self, pixels: Array, camera: Camera, *, small_too: bool, start: Found | None = None
+        self, pixels: Array, camera: Camera, *, small_too: bool, start: HeadDetection | None = None
     ) -> FrameSolution | None:
         """By the detector, the face that matches the head best; None if there is none."""
         if start is not None:
             return self._best_match([start], pixels, camera)
-        starts = self._starter.find(pixels, focal_px=camera.focal_px)
+        starts = self._head_detector.detect(pixels, focal_px=camera.focal_px)
         best = self._best_match(starts, pixels, camera)
         if best is None and small_too:
-            small = self._starter.find(pixels, focal_px=camera.focal_px, small=True)
+            small = self._head_detector.detect(pixels, focal_px=camera.focal_px, small=True)
             best, starts = self._best_match(small, pixels, camera), [*starts, *small]
         self.met_others |= bool(starts) and best is None
         return best
 
-    def resembles(self, pixels: UInt8[Array, "h w 3"], found: Found) -> bool:
+    def resembles(self, pixels: UInt8[Array, "h w 3"], found: HeadDetection) -> bool:
         """Whether the head matches a picture, of its own size or smaller, where it was found."""
         return self._best_match([found], pixels, self._camera_of(pixels)) is not None
 
     def _best_match(
-        self, starts: Sequence[Found], pixels: Array, camera: Camera
+        self, starts: Sequence[HeadDetection], pixels: Array, camera: Camera
     ) -> FrameSolution | None:
         """From the start that gives the best match; None where none matches."""
-        fits = [(self._fit_anew(one.state, pixels, camera), one.misfit_mm) for one in starts]
+        fits = [(self._fit_anew(one.state, pixels, camera), one.rms_mm) for one in starts]
         sound = [(fit, _mismatch(fit, misfit)) for fit, misfit in fits if _if_matching(fit)]
         best, _ = min(sound, key=lambda pair: pair[1], default=(None, 0.0))
         return best if best and best.error.rms <= self._max_rms else None
@@ -268,9 +270,9 @@ class Tracker:
         )
 
 
-def _mismatch(fitted: FrameSolution | None, misfit_mm: float) -> float:
+def _mismatch(fitted: FrameSolution | None, rms_mm: float) -> float:
     """Lower is better. Correlation depends on the light, landmarks on the expression."""
-    return np.inf if fitted is None else (1 - fitted.error.ncc) * misfit_mm
+    return np.inf if fitted is None else (1 - fitted.error.ncc) * rms_mm
 
 
 def _if_matching(fitted: FrameSolution | None) -> FrameSolution | None:

@@ -138,7 +138,7 @@ def test_what_photos_are_called() -> None:
     assert row_of(made_up(video=False), "b.jpg", "--include") == 2
 
 
-def test_stretches_of_frames() -> None:
+def test_ranges_of_frames() -> None:
     assert rows_of(made_up(video=True), "10-40", "--exclude") == [1, 2]
     assert rows_of(made_up(video=True), "12", "--exclude") == [1]
     with pytest.raises(InputError, match="a stretch of frames that show the face, got 13-20"):

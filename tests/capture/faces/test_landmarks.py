@@ -56,7 +56,7 @@ def test_bad_arrays_are_named() -> None:
             Landmarks(**{**good, name: bad})
 
 
-def test_points_beyond_the_edge_are_told_from_those_in_the_picture() -> None:
+def test_points_beyond_the_edge_are_not_in_the_picture() -> None:
     points = np.array([[-1.0, 5], [0, 0], [50, 40], [50, 40.5], [51, 20], [20, 30]])
     expected = [False, True, True, False, False, True]
     assert inside_picture(points, (50, 40)).tolist() == expected

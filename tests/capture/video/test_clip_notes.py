@@ -38,7 +38,7 @@ def test_faces_that_the_edge_cuts_are_counted(
 
 
 @pytest.mark.parametrize("command", [find_faces, pick_frames])
-def test_company_is_counted(
+def test_frames_with_several_faces_are_counted(
     command: Callable[..., object],
     detector: LandmarkDetector,
     faces: dict[str, Array],

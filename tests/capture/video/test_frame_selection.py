@@ -15,7 +15,7 @@ def test_poses_spread_from_the_frontal_one() -> None:
     assert choose_frames(scores, 4).tolist() == [0, 3, 5, 6]
 
 
-def test_like_poses_are_taken_once() -> None:
+def test_similar_poses_are_selected_once() -> None:
     assert len(choose_frames(clip([0, 1, 2, 20, 21]), 7)) == 2
 
 

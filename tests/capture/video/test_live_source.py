@@ -51,7 +51,7 @@ def worked(frames: Iterator[LiveFrame], clock: Clock, seconds: float) -> list[in
     return seen
 
 
-def test_what_is_known_before(video: PacedVideo) -> None:
+def test_properties_before_the_first_frame(video: PacedVideo) -> None:
     assert (video.width, video.height, video.fps) == (64, 48, pytest.approx(4.5, abs=0.1))
 
 

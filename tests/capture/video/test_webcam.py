@@ -68,7 +68,7 @@ def open_device(camera: Camera) -> Webcam:
     return Webcam(0, open_device=lambda number: camera, clock=Ticks(), timeout_s=30.0)
 
 
-def test_what_is_known_before(camera: Camera) -> None:
+def test_properties_before_the_first_frame(camera: Camera) -> None:
     webcam = open_device(camera)
     assert (webcam.width, webcam.height, webcam.fps) == (64, 48, 25.0)
 
@@ -132,7 +132,7 @@ def test_a_camera_that_hangs_ends_with_a_note(camera: Camera) -> None:
     assert webcam.notes == ["camera 0 stopped delivering after 1 pictures"]
 
 
-def test_close_lets_go_of_the_camera(camera: Camera) -> None:
+def test_close_releases_the_camera(camera: Camera) -> None:
     webcam = open_device(camera)
     webcam._patience = 0.01
     webcam.close()

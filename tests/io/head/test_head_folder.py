@@ -109,11 +109,11 @@ def test_cameras_round_trip_to_the_last_bit(small_head: Head, saved: Path) -> No
             assert getattr(loaded.camera, name) == getattr(view.camera, name)
         for name in ("R_cam_head", "t_cam_head", "principal_px"):
             np.testing.assert_array_equal(getattr(loaded.camera, name), getattr(view.camera, name))
-        assert (loaded.photo, loaded.rms_px, loaded.points_used, loaded.distrusted) == (
+        assert (loaded.photo, loaded.rms_px, loaded.points_used, loaded.outliers) == (
             view.photo,
             view.rms_px,
             view.points_used,
-            view.distrusted,
+            view.outliers,
         )
 
 

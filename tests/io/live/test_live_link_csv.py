@@ -10,12 +10,13 @@ import pytest
 
 from mien.animate.channels import head_rotation
 from mien.animate.curves import Curve, constant
-from mien.animate.perform import frames_of, moments
+from mien.animate.perform import frame_times
 from mien.animate.timeline import Timeline
 from mien.assets.generic import load_generic_head
 from mien.errors import FileFormatError, InputError
 from mien.io.live.live_link import UNITS
 from mien.io.live.live_link_csv import load_live_link, save_live_link, timecode
+from moments import moments
 
 HEADER = (
     "Timecode,BlendShapeCount,EyeBlinkLeft,EyeLookDownLeft,EyeLookInLeft,EyeLookOutLeft,"
@@ -289,7 +290,7 @@ def test_a_row_a_second_is_noted(tmp_path: Path) -> None:
 def test_two_rows_far_apart_still_have_a_rate(tmp_path: Path) -> None:
     loaded = load_live_link(recording(tmp_path, codes=("12:00:00:00.000", "13:00:00:00.000")))
     assert (loaded.fps, loaded.duration) == (0.01, 3601.0)
-    assert len(frames_of(loaded)) == 36
+    assert len(frame_times(loaded)) == 36
 
 
 def test_weights_in_percent_are_asked_about(shared: Path) -> None:

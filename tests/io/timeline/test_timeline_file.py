@@ -9,13 +9,13 @@ import pytest
 
 from mien.animate.curves import constant
 from mien.animate.from_track import track_moments
-from mien.animate.perform import moments
 from mien.animate.timeline import Timeline
 from mien.errors import InputError
 from mien.io.live.live_link_csv import save_live_link
 from mien.io.timeline.timeline_file import load_timeline
 from mien.io.timeline.timeline_json import save_timeline
 from mien.io.tracks.track_csv import save_track
+from moments import moments
 from tracks import random_track, track_of
 
 TIMELINE = Timeline(0.5, tracks={"units.jawOpen": constant(0.25)})

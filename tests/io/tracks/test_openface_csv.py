@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mien.animate.from_track import FACING
 from mien.assets.generic import load_generic_head
+from mien.camera import FRONTAL
 from mien.errors import InputError
 from mien.head import Expression, Head
 from mien.io.live.live_link import LOOK_RANGE
@@ -70,7 +70,7 @@ def test_angles_are_openfaces(rng: np.random.Generator) -> None:
         Rotation.from_euler(axis, angle).as_matrix()
         for axis, angle in zip("xyz", pose_angles(state.R_cam_head), strict=True)
     )
-    np.testing.assert_allclose(about_x @ about_y @ about_z @ FACING, state.R_cam_head, atol=1e-12)
+    np.testing.assert_allclose(about_x @ about_y @ about_z @ FRONTAL, state.R_cam_head, atol=1e-12)
 
 
 def test_signs_of_angles() -> None:
@@ -78,14 +78,14 @@ def test_signs_of_angles() -> None:
     nose = np.array([0, 0, 1])
     up, right = (Rotation.from_euler(a, s).as_matrix() for a, s in (("x", -0.2), ("y", -0.3)))
     assert (up @ nose)[1] > 0
-    np.testing.assert_allclose(pose_angles(FACING @ up), (-0.2, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(pose_angles(FRONTAL @ up), (-0.2, 0, 0), atol=1e-12)
     assert (right @ nose)[0] < 0
-    np.testing.assert_allclose(pose_angles(FACING @ right), (0, 0.3, 0), atol=1e-12)
+    np.testing.assert_allclose(pose_angles(FRONTAL @ right), (0, 0.3, 0), atol=1e-12)
 
 
 def test_eyes_that_look_at_the_camera_look_along_minus_z() -> None:
-    np.testing.assert_allclose(gaze_vectors(FACING, Gaze(), {}), [[0, 0, -1]] * 2)
-    turned = FACING @ Rotation.from_euler("y", 0.3).as_matrix()
+    np.testing.assert_allclose(gaze_vectors(FRONTAL, Gaze(), {}), [[0, 0, -1]] * 2)
+    turned = FRONTAL @ Rotation.from_euler("y", 0.3).as_matrix()
     np.testing.assert_allclose(gaze_vectors(turned, Gaze(-0.3), {}), [[0, 0, -1]] * 2, atol=1e-12)
 
 
@@ -93,7 +93,7 @@ def test_gaze_angles_grow_to_the_pictures_right_and_down(
     tmp_path: Path, rng: np.random.Generator
 ) -> None:
     looks = ((0.2, 0.0), (0.0, -0.1))
-    states = [replace(random_state(rng), R_cam_head=FACING, gaze=np.array(look)) for look in looks]
+    states = [replace(random_state(rng), R_cam_head=FRONTAL, gaze=np.array(look)) for look in looks]
     save_openface(tmp_path / "a.csv", track_of(states, rng))
     left, down = rows_of(tmp_path / "a.csv")
     assert float(left["gaze_angle_x"]) == pytest.approx(0.2, abs=1e-6)
@@ -103,10 +103,10 @@ def test_gaze_angles_grow_to_the_pictures_right_and_down(
 
 def test_eye_0_is_the_pictures_leftmost() -> None:
     """The subject's right eye, which looks at the nose."""
-    first, second = gaze_vectors(FACING, Gaze(), {"eyeLookInRight": 0.5})
+    first, second = gaze_vectors(FRONTAL, Gaze(), {"eyeLookInRight": 0.5})
     np.testing.assert_allclose(first, (np.sin(LOOK_RANGE / 2), 0, -np.cos(LOOK_RANGE / 2)))
     np.testing.assert_allclose(second, (0, 0, -1))
-    up = gaze_vectors(FACING, Gaze(0, 0.1), {unit: 1 for unit in EYE_LOOK_UNITS if "Up" in unit})
+    up = gaze_vectors(FRONTAL, Gaze(0, 0.1), {unit: 1 for unit in EYE_LOOK_UNITS if "Up" in unit})
     np.testing.assert_allclose(np.arctan2(-up[:, 1], -up[:, 2]), LOOK_RANGE + 0.1)
 
 

@@ -1,4 +1,4 @@
-"""Compiled kernels are kept where that is possible, and no file of them is trusted unseen."""
+"""Compiled kernels are kept where a folder can be written; their files are verified."""
 
 from __future__ import annotations
 

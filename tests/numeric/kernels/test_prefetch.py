@@ -14,7 +14,7 @@ def asked(values, index):
     return values[0]
 
 
-def test_any_element_may_be_asked_for():
+def test_any_index_may_be_prefetched():
     for values in (np.arange(5, dtype=np.uint32), np.arange(5.0)):
         for index in (0, 4, 10**6, 10**15):
             assert asked(values, np.uint64(index)) == 0

@@ -68,7 +68,7 @@ def test_barycentrics_are_those_of_the_rasteriser(rng: np.random.Generator) -> N
         np.testing.assert_allclose(shares, raster.barycentrics[row, col], atol=1e-5)
 
 
-def test_a_place_past_an_edge_comes_to_the_edge() -> None:
+def test_barycentrics_beyond_an_edge_are_clamped_to_it() -> None:
     points = np.array([[10.0, 10], [10, 50], [50, 10]])
     coverage = prepare_coverage(points, np.full(3, 5.0), np.array([[0, 1, 2]]), 60, 60)
     assert barycentrics_at(coverage.planes, 0, 5.0, 30.0) == pytest.approx((0.5, 0.5, 0))

@@ -65,7 +65,7 @@ def test_lm_follows_a_curved_valley():
     assert result.cost < 1e-15
 
 
-def test_lm_says_when_it_ran_out_of_iterations():
+def test_lm_reports_that_it_ran_out_of_iterations():
     result = solve_rosenbrock([-1.2, 1.0], max_iterations=3)
     assert not result.converged
     assert result.iterations == 3
@@ -134,7 +134,7 @@ def test_a_block_without_data_is_infinitely_uncertain(system):
     assert list(np.flatnonzero(blocks.open_blocks())) == [3]
 
 
-def test_covariance_refuses_what_nothing_determines(system):
+def test_covariance_of_undetermined_unknowns_is_refused(system):
     blocks, _, _ = system
     blocks.common[0], blocks.common[:, 0], blocks.coupling[:, 0] = 0, 0, 0
     with pytest.raises(EstimationError, match="not determined"):

@@ -11,9 +11,9 @@ import pytest
 
 from filmed import grey, written
 from mien.animate.channels import head_rotation
-from mien.animate.from_track import FACING
 from mien.animate.timeline import Moment
 from mien.arrays import Array
+from mien.camera import FRONTAL
 from mien.capture.video.live_source import LiveFrame, LiveSource, PacedVideo
 from mien.errors import InputError
 from mien.pipelines.tracking.live_tracker import (
@@ -194,7 +194,7 @@ def test_an_error_is_not_swallowed_and_the_source_is_closed(clock: Clock, tracke
 def test_a_moment_is_what_the_camera_sees(rng: np.random.Generator) -> None:
     turned = head_rotation(0.3, -0.2, 0.1)
     state = TrackState(
-        R_cam_head=FACING @ turned,
+        R_cam_head=FRONTAL @ turned,
         t_cam_head=np.array([10.0, -20.0, 700.0]),
         weights=np.array([[0.5, 0.5, 0.0], [1.0, 0.0, 0.0]]),
         units=np.array([0.7, 0.0]),

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mien.animate.from_track import FACING
+from mien.camera import FRONTAL
 from mien.errors import EstimationError
 from mien.head import Head
 from mien.pipelines.tracking.notes import check_found, track_notes
@@ -25,7 +25,7 @@ def shown(number: int, x: float = 0.0, rms: float = 5.0) -> TrackedFrame:
     weights = np.zeros((len(LAYOUT.regions), len(LAYOUT.expressions)))
     weights[:, 0] = 1
     state = TrackState(
-        FACING, np.array([x, 0.0, 800.0]), weights, np.zeros(len(LAYOUT.units)), np.zeros(2)
+        FRONTAL, np.array([x, 0.0, 800.0]), weights, np.zeros(len(LAYOUT.units)), np.zeros(2)
     )
     unknown = np.zeros(len(LAYOUT.channels))
     return TrackedFrame(

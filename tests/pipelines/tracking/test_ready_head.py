@@ -23,18 +23,18 @@ def test_lens_and_tracker_share_what_is_slow(monkeypatch: pytest.MonkeyPatch) ->
         for module in ("mien.pipelines.tracking.ready_head", "mien.track.tracker"):
             monkeypatch.setattr(f"{module}.{name}", make)
 
-    for name in ("FaceModel", "Starter"):
+    for name in ("FaceModel", "HeadDetector"):
         counted(name)
     ready = ReadyHead(patterned.head(), Blind(), TrackOptions(units=("jawOpen",)))
     assert made == [], "nothing before it is used"
-    starter = ready.starter
+    head_detector = ready.head_detector
     tracker = ready.tracker(64, 48, 100.0)
-    assert made == ["FaceModel", "Starter"]
-    assert tracker.layout is starter.layout
+    assert made == ["FaceModel", "HeadDetector"]
+    assert tracker.layout is head_detector.layout
     assert tracker.layout.units == ("jawOpen",)
 
 
 def test_a_unit_that_the_head_lacks() -> None:
     ready = ReadyHead(patterned.head(), Blind(), TrackOptions(units=("wink",)))
     with pytest.raises(InputError, match="wink"):
-        _ = ready.starter
+        _ = ready.head_detector

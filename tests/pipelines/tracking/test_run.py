@@ -11,9 +11,8 @@ import pytest
 
 import mien.pipelines.tracking.ready_head
 from filmed import flagged, written
-from mien.animate.from_track import FACING
 from mien.arrays import Array
-from mien.camera import Camera
+from mien.camera import FRONTAL, Camera
 from mien.capture.video.video import Video
 from mien.errors import EstimationError, FileFormatError
 from mien.head import Head
@@ -51,7 +50,7 @@ def camera_at(tenths: int) -> Camera:
     """That sees the head turn steadily and come nearer."""
     turn = rotation_from_vector(np.array([0.02, np.radians(tenths - 15), 0.03]))
     place = np.array([tenths - 10.0, 20.0, 480.0 - tenths])
-    return Camera(WIDTH, HEIGHT, FOCAL, FACING @ turn, place)
+    return Camera(WIDTH, HEIGHT, FOCAL, FRONTAL @ turn, place)
 
 
 def film(head: Head) -> list[Array]:
@@ -183,7 +182,7 @@ WITH_OWNER = (*range(6), *range(12, 18))
 def beside(number: int) -> Camera:
     """That sees the head small, at the right."""
     turn = rotation_from_vector(np.array([0.02, np.radians(2 * number - 15), 0.03]))
-    return Camera(*COMPANY, 2 * FOCAL, FACING @ turn, np.array([330.0 + number, 20.0, 1100.0]))
+    return Camera(*COMPANY, 2 * FOCAL, FRONTAL @ turn, np.array([330.0 + number, 20.0, 1100.0]))
 
 
 @pytest.fixture(scope="module")

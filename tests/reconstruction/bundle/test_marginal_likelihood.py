@@ -17,7 +17,7 @@ def given(make_scene, rng):
         "t": np.stack([camera.t_cam_head for camera in scene.cameras]),
         "focal": np.array([camera.focal_px for camera in scene.cameras]),
         "precision": np.isfinite(scene.image_points[..., 0]) * rng.uniform(0.3, 1, (5, 60)),
-        "places": scene.generic,
+        "points": scene.generic,
         "sigma": rng.uniform(0.5, 2, 60),
     }
 
@@ -48,7 +48,7 @@ def test_gradient_against_central_differences(given):
 def test_is_the_determinant_of_the_images_covariance(given, make_scene):
     """One point: det(1 + sigma^2 J J^T) over all its image coordinates."""
     camera, h = make_scene(0).cameras[0], 1e-4
-    place = given["places"][4]
+    place = given["points"][4]
     jacobian = np.stack(
         [
             (camera.project((place + h * e)[None]) - camera.project((place - h * e)[None]))[0]
@@ -59,7 +59,7 @@ def test_is_the_determinant_of_the_images_covariance(given, make_scene):
     expected = 0.5 * np.log(np.linalg.det(np.eye(2) + 4 * jacobian @ jacobian.T))
     one = {name: given[name][:1] for name in ("R", "t", "focal")}
     value = point_evidence(
-        **one, precision=np.ones((1, 1)), places=place[None], sigma=np.array([2.0])
+        **one, precision=np.ones((1, 1)), points=place[None], sigma=np.array([2.0])
     )
     assert value[0] == pytest.approx(expected, rel=1e-6)
 
@@ -68,7 +68,7 @@ def test_points_without_a_prior_do_not_count(given):
     given["sigma"][10:] = np.inf
     whole = point_evidence(**given)
     few = {**given, **{n: given[n][..., :10] for n in ("precision", "sigma")}}
-    few["places"] = given["places"][:10]
+    few["points"] = given["points"][:10]
     assert whole[0] == point_evidence(**few)[0]
     np.testing.assert_array_equal(whole[1], point_evidence(**few)[1])
 

@@ -29,9 +29,9 @@ def test_the_surface_behind_a_pixel_is_what_the_photo_shows_there() -> None:
         crop = crop_view(VIEW, CAMERA, MESH, mm_per_px)
         assert crop is not None
         rows, columns = np.nonzero(crop.raster.mask)
-        places = interpolate(crop.raster, MESH.triangles, MESH.vertices)[rows, columns]
+        points = interpolate(crop.raster, MESH.triangles, MESH.vertices)[rows, columns]
         there = crop.to_photo(np.column_stack([columns, rows]) + 0.5)
-        np.testing.assert_allclose(CAMERA.project(places), there, atol=0.01)
+        np.testing.assert_allclose(CAMERA.project(points), there, atol=0.01)
 
 
 def test_no_finer_than_the_photo() -> None:

@@ -48,7 +48,7 @@ def test_no_motion_brings_anything_nearer_to_what_is_believed(instruments: bool)
 
 
 def test_noise_does_not_drive_the_head_away() -> None:
-    """Places that deviate much and matches that err much leave the frame where beliefs put it."""
+    """Places that deviate much and matches that err much leave the frame where prior put it."""
     scene = observed(2, (-45, -20, 0, 20, 45), noise_px=2.0, deviation_mm=6.0)
     found, plain = solved(scene), solved(scene, instruments=False)
     assert found.converged
@@ -58,7 +58,7 @@ def test_noise_does_not_drive_the_head_away() -> None:
 
 
 def test_the_frame_of_the_start_does_not_matter() -> None:
-    """Poses are believed in so weakly that the places decide."""
+    """Poses are believed in so weakly that the points decide."""
     scene = observed(3, (-30, 0, 30), noise_px=0.1)
     turn, shift, scale = (
         rotation_from_vector(np.array([0.02, -0.03, 0.01])),

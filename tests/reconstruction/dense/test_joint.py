@@ -1,4 +1,4 @@
-"""The joint solution on synthetic sightings of places that are known exactly."""
+"""The joint solution on synthetic observations of points that are known exactly."""
 
 from __future__ import annotations
 

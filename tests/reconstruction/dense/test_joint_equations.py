@@ -26,7 +26,7 @@ SHARED = np.array([0, 1, 0])
 
 
 def problem_of(scene: Scene) -> tuple[BundleProblem, BundleState]:
-    """Two photos share a lens; the state is off, its places off their beliefs."""
+    """Two photos share a lens; the state is off, its points off their prior."""
     lenses = FocalGroups(SHARED, np.log([2500.0, 2800.0]), np.array([0.1, 0.2]))
     starts = scene.starts()
     components = len(scene.prior.components)
@@ -39,9 +39,9 @@ def problem_of(scene: Scene) -> tuple[BundleProblem, BundleState]:
 
 
 def whole_system(problem: BundleProblem, state: BundleState) -> tuple[Array, Array]:
-    """Least squares over cameras, coefficients and places, nothing eliminated."""
+    """Least squares over cameras, coefficients and points, nothing eliminated."""
     misfit, count = reprojection(problem, state), len(state.points)
-    photo, place = problem.observations.photo, problem.observations.point
+    photo, point = problem.observations.photo, problem.observations.point
     photos, lenses = len(state.R), len(state.log_focal)
     common = 6 * photos + lenses + len(state.coefficients)
     jacobian = np.zeros((2 * len(photo), common + 3 * count))
@@ -50,7 +50,7 @@ def whole_system(problem: BundleProblem, state: BundleState) -> tuple[Array, Arr
         rows = slice(2 * m, 2 * m + 2)
         jacobian[rows, 6 * photo[m] : 6 * photo[m] + 6] = by_camera[m, :, : CAMERA_SIZE - 1]
         jacobian[rows, 6 * photos + SHARED[photo[m]]] = by_camera[m, :, -1]
-        first = common + 3 * place[m]
+        first = common + 3 * point[m]
         jacobian[rows, first : first + 3] = misfit.projection.point_jacobian[m]
     weights = np.repeat(misfit.weights, 2)
     off = np.zeros((3 * count, jacobian.shape[1]))
@@ -107,12 +107,12 @@ def test_no_small_change_costs_less_without_instruments() -> None:
     count = len(found.covariance)
     for unknown in range(count + 6):
         for size in (-1e-4, 1e-4):
-            step, places = np.zeros(count), np.zeros_like(scene.points)
+            step, points = np.zeros(count), np.zeros_like(scene.points)
             if unknown < count:
                 step[unknown] = size
             else:
-                places.flat[unknown - count] = size
-            assert cost(found.problem, found.state.moved(step, places), noise) > best
+                points.flat[unknown - count] = size
+            assert cost(found.problem, found.state.moved(step, points), noise) > best
 
 
 def test_with_instruments_their_sums_vanish_but_for_the_frame() -> None:

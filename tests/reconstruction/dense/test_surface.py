@@ -11,7 +11,7 @@ from mien.camera import Camera
 from mien.mesh import Mesh
 from mien.reconstruction.dense.crops import visible_mesh
 from mien.reconstruction.dense.surface import measure_offsets, move_surface, sample_heights
-from mien.reconstruction.dense.surface_tracks import Tracks
+from mien.reconstruction.dense.tracks import Tracks
 from mien.reconstruction.shape.deformation import eye_centers
 
 CAMERAS = (at(-25), at(0), at(25))
@@ -23,17 +23,17 @@ def seen_exactly(truth: Array, mesh: Mesh, cameras: Sequence[Camera], count: int
     front = mesh.triangles[(mesh.vertices[mesh.triangles][..., 2] > -10).all(axis=1)]
     corners = front[rng.integers(len(front), size=count)]
     shares = rng.dirichlet(np.ones(3), size=count)
-    places = np.einsum("nc,ncd->nd", shares, truth[corners])
+    points = np.einsum("nc,ncd->nd", shares, truth[corners])
     photos = len(cameras)
     return Tracks(
         corners=corners,
         barycentrics=shares,
         reference=np.zeros(count, int),
         photo=np.repeat(np.arange(photos), count),
-        place=np.tile(np.arange(count), photos),
-        image_points=np.concatenate([camera.project(places) for camera in cameras]),
+        point=np.tile(np.arange(count), photos),
+        image_points=np.concatenate([camera.project(points) for camera in cameras]),
         sigma_px=np.full(photos * count, 0.05),
-        crowding=np.ones(count),
+        overlap=np.ones(count),
     )
 
 
@@ -72,7 +72,7 @@ def test_a_tenth_of_wrong_matches_does_no_harm(swollen: Array) -> None:
     mesh = visible_mesh(GENERIC, GENERIC.mesh.vertices)
     tracks = seen_exactly(swollen, mesh, CAMERAS)
     rng = np.random.default_rng(1)
-    wrong = rng.random(len(tracks.place)) < 0.1
+    wrong = rng.random(len(tracks.point)) < 0.1
     tracks.image_points[wrong] += rng.normal(size=(wrong.sum(), 2)) * 3
     moved = move_surface(
         GENERIC.mesh.vertices, tracks, measure_offsets(tracks, CAMERAS, mesh), GENERIC

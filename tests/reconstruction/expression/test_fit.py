@@ -33,10 +33,10 @@ from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
 from mien.reconstruction.expression.fit import (
-    SAME_LENS_SD,
-    STRANGE_SKIN,
+    INCONSISTENT_SKIN,
+    SAME_CAMERA_SD,
     _expected_units,
-    _lenses,
+    _focal_lengths,
     fit_expression,
 )
 from mien.reconstruction.landmark_fit import FOCAL_PRIOR_DEVIATION
@@ -170,13 +170,13 @@ def test_too_few_marks_leave_a_photo_out() -> None:
 def test_skin_that_is_not_neutrals_leads_nothing() -> None:
     """Another person's skin under exact landmarks: landmarks alone decide, and a note says so."""
     (seen_from,) = CAMERAS["one photo"]
-    strange = exactly_detected(
+    inconsistent = exactly_detected(
         Person(smiling(), 7).seen_by(seen_from, name="0.png"), seen_from, smiling()
     )
-    fit = fit_expression([strange], known_head())
+    fit = fit_expression([inconsistent], known_head())
     found = fit.photos["0.png"].camera
     assert np.degrees(angle_between(found.R_cam_head, seen_from.R_cam_head)) < 0.5
-    assert fit.notes == (STRANGE_SKIN.format("0.png"),)
+    assert fit.notes == (INCONSISTENT_SKIN.format("0.png"),)
     assert fitted("one photo").notes == ()
 
 
@@ -200,9 +200,9 @@ def test_frames_of_the_neutral_clip_share_its_lens() -> None:
     known = known_head()
     neutral = replace(known.views[0], photo=replace(known.views[0].photo, path=clip))
     known = replace(known, views=[neutral])
-    focal, deviation = _lenses([same, view], known)
+    focal, deviation = _focal_lengths([same, view], known)
     assert focal[0] == known.cameras[0].focal_px
-    np.testing.assert_allclose(deviation, [SAME_LENS_SD, FOCAL_PRIOR_DEVIATION])
+    np.testing.assert_allclose(deviation, [SAME_CAMERA_SD, FOCAL_PRIOR_DEVIATION])
 
 
 def test_expected_units_are_what_scores_rise_by() -> None:

@@ -10,7 +10,7 @@ import pytest
 from expressive import NEUTRAL, exactly_detected, looking, neutral_photo
 from marbled import GENERIC, at
 from mien.capture.faces.mediapipe_face import LEFT_IRIS, RIGHT_IRIS
-from mien.reconstruction.expression.gaze import iris_directions, yaw_pitch_of
+from mien.reconstruction.expression.gaze import iris_directions, yaw_pitch_from_directions
 from people import person
 
 IRISES = [LEFT_IRIS, RIGHT_IRIS]
@@ -23,7 +23,7 @@ def angles(vertices: np.ndarray, *, seen_from: float, turned: tuple[float, float
     directions = iris_directions(view, item, vertices, GENERIC)
     assert directions is not None
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1)
-    return np.degrees(yaw_pitch_of(directions))
+    return np.degrees(yaw_pitch_from_directions(directions))
 
 
 @pytest.mark.parametrize("seen_from", [-30.0, 0.0, 15.0])
@@ -44,8 +44,8 @@ def test_directions_are_those_from_the_centres_to_the_irises() -> None:
     vertices = looking(NEUTRAL, 10, -5)
     view = exactly_detected(neutral_photo(), at(12), vertices)
     directions = iris_directions(view, at(12), NEUTRAL, GENERIC)
-    places = GENERIC.landmark_positions(vertices)[IRISES]
-    for found, place, name in zip(directions, places, ("left", "right"), strict=True):
+    points = GENERIC.landmark_positions(vertices)[IRISES]
+    for found, place, name in zip(directions, points, ("left", "right"), strict=True):
         ball = np.unique(GENERIC.mesh.triangles[GENERIC.mesh.triangles_of(f"{name}_eyeball")])
         true = place - NEUTRAL[ball].mean(axis=0)
         np.testing.assert_allclose(found, true / np.linalg.norm(true), atol=1e-4)
@@ -72,4 +72,4 @@ def test_yaw_is_to_the_subjects_left_and_pitch_up(rng: np.random.Generator) -> N
     directions = np.column_stack(
         [np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)]
     )
-    np.testing.assert_allclose(yaw_pitch_of(directions), np.column_stack([yaw, pitch]))
+    np.testing.assert_allclose(yaw_pitch_from_directions(directions), np.column_stack([yaw, pitch]))

@@ -1,4 +1,4 @@
-"""Landmarks that mean other places than those that they are attached to."""
+"""Landmarks that mean other points than those that they are attached to."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from mien.reconstruction.features import POINT_SIGMA_MM, gather_features
 from mien.reconstruction.observations import SurfaceObservations
 
 OFF_MM = np.random.default_rng(2).normal(size=(478, 3))
-"""By how much this detector means other places, on any head."""
+"""By how much this detector means other points, on any head."""
 CAMERA = at(5, 2)
 TRUE = making(weights_of(mouthSmile=0.6, jawOpen=0.3))
 
@@ -97,23 +97,23 @@ def test_a_detector_that_was_unsure_is_believed_less() -> None:
 
 def test_how_far_sightings_are_trusted() -> None:
     names = ("chin", "nose_tip")
-    places = CAMERA.project(TRUE[[GENERIC.vertex_of(name) for name in names]])
+    points = CAMERA.project(TRUE[[GENERIC.vertex_of(name) for name in names]])
     view = replace(
         exactly_detected(neutral_photo(), CAMERA, TRUE),
-        annotations=Annotations(dict(zip(names, places, strict=True))),
+        annotations=Annotations(dict(zip(names, points, strict=True))),
     )
     features = gather_features([view], GENERIC)
     seen = feature_observations(features, known_from([at(0)]))
     on_face = GENERIC.regions["face"][features.corners].max(axis=1) > 0
-    assert len(seen.photo) == (features.seen[0] & on_face).sum(), "irises turn by themselves"
+    assert len(seen.photo) == (features.observed[0] & on_face).sum(), "irises turn by themselves"
     by_hand = seen.sigma_mm == POINT_SIGMA_MM
     assert by_hand.sum() == 2
-    np.testing.assert_allclose(seen.image_points[by_hand], places)
+    np.testing.assert_allclose(seen.image_points[by_hand], points)
     np.testing.assert_array_equal(seen.offset[by_hand], 0)
     assert set(seen.sigma_mm[~by_hand]) == {EXPRESSED_EDGE_MM, EXPRESSED_SKIN_MM}
     np.testing.assert_array_equal(
         seen.sigma_mm[~by_hand] == EXPRESSED_EDGE_MM,
-        features.on_edges[features.seen[0] & on_face][~by_hand],
+        features.on_edges[features.observed[0] & on_face][~by_hand],
     )
 
 

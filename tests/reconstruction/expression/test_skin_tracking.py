@@ -11,7 +11,7 @@ from expressive import FACE, NEUTRAL, known_head, making, neutral_photo, weights
 from marbled import GENERIC, Person, at, clutter
 from mien.arrays import Array
 from mien.reconstruction.expression.known_head import KnownHead
-from mien.reconstruction.expression.skin_tracking import MATCHED_SIGMA_MM, _nearest, follow_skin
+from mien.reconstruction.expression.skin_tracking import MATCHED_SIGMA_MM, _nearest, track_skin
 from mien.reconstruction.observations import SurfaceObservations
 
 KNOWN = known_head(-25.0, 0.0, 25.0)
@@ -23,7 +23,7 @@ VIEW = Person(TRUE, 1).seen_by(CAMERA)
 def followed(
     start: Array, *, mm_per_px: float = 0.8, known: KnownHead = KNOWN
 ) -> SurfaceObservations:
-    found = follow_skin(VIEW, CAMERA, start, known, photo=3, mm_per_px=mm_per_px)
+    found = track_skin(VIEW, CAMERA, start, known, photo=3, mm_per_px=mm_per_px)
     assert found is not None
     return found
 
@@ -69,8 +69,8 @@ def test_sightings_as_later_steps_want_them() -> None:
     np.testing.assert_allclose(found.barycentrics.sum(axis=1), 1, atol=1e-5)
     assert (found.sigma_mm >= MATCHED_SIGMA_MM).all()
     # Evenly spread: none twice, none nearer to another than the grid says.
-    places = found.on(NEUTRAL)
-    assert len(np.unique(places, axis=0)) == len(places)
+    points = found.on(NEUTRAL)
+    assert len(np.unique(points, axis=0)) == len(points)
 
 
 def test_the_nearest_neutral_photo_with_a_face_is_looked_at() -> None:
@@ -90,11 +90,11 @@ def test_where_nothing_looks_alike_nothing_is_found(shown: str) -> None:
         noise = np.clip(clutter(*pixels.shape[:2], 8), 0, 255).astype(np.uint8)
         view = replace(VIEW, photo=replace(VIEW.photo, pixels=np.stack([noise] * 3, axis=2)))
         seen_from = replace(CAMERA, t_cam_head=CAMERA.t_cam_head + np.array([3000.0, 0, 0]))
-    assert follow_skin(view, seen_from, TRUE, KNOWN, photo=0, mm_per_px=1.6) is None
+    assert track_skin(view, seen_from, TRUE, KNOWN, photo=0, mm_per_px=1.6) is None
 
 
 def test_the_same_photo_is_found_in_itself() -> None:
-    found = follow_skin(neutral_photo(), at(0), NEUTRAL, known_head(), photo=0, mm_per_px=0.8)
+    found = track_skin(neutral_photo(), at(0), NEUTRAL, known_head(), photo=0, mm_per_px=0.8)
     assert found is not None
     off = np.linalg.norm(at(0).project(found.on(NEUTRAL)) - found.image_points, axis=1)
     assert np.percentile(off, 95) < 0.15

@@ -15,7 +15,7 @@ from mien.capture.source import CapturedView
 from mien.errors import EstimationError
 from mien.numeric.rotation import angle_between
 from mien.reconstruction.fit import FitOptions, fit_views
-from mien.reconstruction.localization import place_view, place_views
+from mien.reconstruction.localization import localize_view, localize_views
 from people import cameras, person
 from people import photographed as marked
 
@@ -35,12 +35,12 @@ def landscape() -> Array:
 
 @pytest.fixture(scope="module")
 def placed(ann: Person, frontal: Known) -> dict[str, Camera | None]:
-    """Her profiles, what looks like profiles of hers, and what does not."""
+    """Her profiles, what references like profiles of hers, and what does not."""
     views = {name: ann.seen_by(camera) for name, camera in TRUE.items()}
     views["mirrored"] = view_of(views["left"].photo.pixels[:, ::-1])
     views["somebody else"] = Person(ann.vertices, 2).seen_by(TRUE["left"])
     views["landscape"] = view_of(landscape())
-    found = place_views(list(views.values()), frontal, ann.vertices, GENERIC)
+    found = localize_views(list(views.values()), frontal, ann.vertices, GENERIC)
     return dict(zip(views, found, strict=True))
 
 
@@ -63,8 +63,8 @@ def test_a_placed_photo_helps_to_place_the_next(ann: Person) -> None:
     (first,) = photographed(ann, (0.0,))
     far, between = at(-110.0), at(-60.0, 5.0)
     views = [ann.seen_by(far), ann.seen_by(between)]
-    assert place_view(views[0], [first], ann.vertices, GENERIC) is None
-    found = place_views(views, [first], ann.vertices, GENERIC)
+    assert localize_view(views[0], [first], ann.vertices, GENERIC) is None
+    found = localize_views(views, [first], ann.vertices, GENERIC)
     for camera, true in zip(found, (far, between), strict=True):
         assert camera is not None
         assert np.degrees(angle_between(camera.R_cam_head, true.R_cam_head)) < 2
@@ -72,9 +72,9 @@ def test_a_placed_photo_helps_to_place_the_next(ann: Person) -> None:
 
 def test_without_other_photos_there_is_nothing_to_go_by(ann: Person) -> None:
     view = ann.seen_by(TRUE["left"])
-    assert place_view(view, [], ann.vertices, GENERIC) is None
-    assert place_views([view], [], ann.vertices, GENERIC) == (None,)
-    assert place_views([], [], ann.vertices, GENERIC) == ()
+    assert localize_view(view, [], ann.vertices, GENERIC) is None
+    assert localize_views([view], [], ann.vertices, GENERIC) == (None,)
+    assert localize_views([], [], ann.vertices, GENERIC) == ()
 
 
 def test_photo_without_marks_does_not_trouble_the_fit() -> None:

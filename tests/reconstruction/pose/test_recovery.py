@@ -110,8 +110,8 @@ def test_bad_points_are_distrusted(make_scene, seed):
     bad = rng.random(scene.image_points.shape[:2]) < 0.1
     scene.image_points[bad] += 80 * rng.normal(size=(bad.sum(), 2))
     result = recover(scene)
-    assert not (result.trusted & bad & (off_by(scene, result) > 10)).any()
-    assert result.trusted[~bad].mean() > 0.98
+    assert not (result.inliers & bad & (off_by(scene, result) > 10)).any()
+    assert result.inliers[~bad].mean() > 0.98
     assert scene.errors(result.cameras, result.points)[0].max() < 0.5
 
 
@@ -125,7 +125,7 @@ def test_marks_that_agree_on_a_wrong_place_are_distrusted(make_scene):
     wrong[point] += 90 * toward / np.linalg.norm(toward)
     scene.image_points[second, point] = scene.cameras[second].project(wrong)[point]
     result = recover(scene)
-    assert not result.trusted[:, point].any()
+    assert not result.inliers[:, point].any()
     np.testing.assert_allclose(result.points[point], scene.generic[point], atol=1e-9)
 
 
@@ -143,7 +143,7 @@ def test_a_photo_of_something_else_is_left_out(make_scene):
     assert [k for k, text in enumerate(result.problems) if text] == [2]
     assert result.cameras[2] is None
     assert np.isnan(result.rms_px[2])
-    assert not result.trusted[2].any()
+    assert not result.inliers[2].any()
     assert result.rms_px[0] < 1.5 * clean.rms_px[0]
 
 
@@ -186,7 +186,7 @@ def test_weight_zero_hides_an_observation(make_scene):
     spoiled[1, :10] = np.nan
     b = recover_pose(spoiled, scene.generic, scene.sizes, loss="linear")
     np.testing.assert_allclose(a.points, b.points, atol=1e-9)
-    assert not a.trusted[1, :10].any()
+    assert not a.inliers[1, :10].any()
 
 
 def test_the_reversed_relief_is_not_taken(make_scene):
@@ -235,7 +235,7 @@ def test_observations_of_different_precision(make_scene):
     scene.image_points[:] += sigma[..., None] * rng.normal(size=scene.image_points.shape)
     weighted = recover(scene, weights=1 / sigma**2)
     equal = recover(scene, loss="linear")
-    assert weighted.trusted.mean() > 0.98
+    assert weighted.inliers.mean() > 0.98
     degrees = scene.errors(weighted.cameras, weighted.points)[0].mean()
     assert degrees < 0.4 * scene.errors(equal.cameras, equal.points)[0].mean()
     scaled = recover(scene, weights=100 / sigma**2)
@@ -246,4 +246,4 @@ def test_good_points_are_kept(make_scene):
     for seed in range(6):
         scene = make_scene(seed, noise=1.0, count=100)
         seen = np.isfinite(scene.image_points[..., 0])
-        np.testing.assert_array_equal(recover(scene).trusted, seen)
+        np.testing.assert_array_equal(recover(scene).inliers, seen)

@@ -12,7 +12,7 @@ from marbled import GENERIC, at
 from mien.arrays import Array
 from mien.numeric.solvers.robust import loss_named
 from mien.reconstruction.observations import SurfaceObservations
-from mien.reconstruction.shape.skin import BENDING, REACH_MM, _stiffness, move_skin
+from mien.reconstruction.shape.skin import BENDING, REACH_MM, _stiffness, deform_skin
 
 CAMERAS = [at(-20, 4), at(20, -4)]
 NOWHERE = np.zeros(len(NEUTRAL))
@@ -47,7 +47,7 @@ def seen(moved: Array) -> SurfaceObservations:
 
 @pytest.fixture(scope="module")
 def found(seen: SurfaceObservations) -> Array:
-    return move_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE)
+    return deform_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE)
 
 
 def test_skin_goes_where_two_photos_show_it(
@@ -69,19 +69,19 @@ def test_only_skin_moves(found: Array) -> None:
 
 def test_what_is_seen_where_it_is_does_not_move() -> None:
     seen = skin_seen(NEUTRAL, CAMERAS, count=300)
-    still = move_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE)
+    still = deform_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE)
     np.testing.assert_allclose(still, NEUTRAL, atol=1e-9)
 
 
 def test_without_sightings_nothing_moves() -> None:
     seen = skin_seen(NEUTRAL, CAMERAS, count=3)
     nothing = SurfaceObservations(*(getattr(seen, field.name)[:0] for field in fields(seen)))
-    still = move_skin(NEUTRAL, nothing, CAMERAS, GENERIC, held=NOWHERE)
+    still = deform_skin(NEUTRAL, nothing, CAMERAS, GENERIC, held=NOWHERE)
     np.testing.assert_allclose(still, NEUTRAL, atol=1e-9)
 
 
 def cost(vertices: Array, seen: SurfaceObservations, across_sd_mm: float | None) -> float:
-    """What move_skin says it minimizes: the distances written out, the bending its own."""
+    """What deform_skin says it minimizes: the distances written out, the bending its own."""
     total = 0.0
     for k, item in enumerate(CAMERAS):
         mine = seen.photo == k
@@ -96,7 +96,7 @@ def cost(vertices: Array, seen: SurfaceObservations, across_sd_mm: float | None)
 def test_every_nudge_of_the_answer_costs(
     seen: SurfaceObservations, rng: np.random.Generator, across_sd_mm: float | None
 ) -> None:
-    best = move_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE, across_sd_mm=across_sd_mm)
+    best = deform_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE, across_sd_mm=across_sd_mm)
     least = cost(best, seen, across_sd_mm)
     assert least < 0.5 * cost(NEUTRAL, seen, across_sd_mm)
     for width_mm in (10, 20, 40, 40):
@@ -125,7 +125,7 @@ def test_held_skin_stays() -> None:
     lifted = NEUTRAL + np.array([0, 3, 0])
     seen = skin_seen(lifted, CAMERAS, count=600)
     moves, free = (
-        np.linalg.norm(move_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=mask) - NEUTRAL, axis=1)
+        np.linalg.norm(deform_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=mask) - NEUTRAL, axis=1)
         for mask in (held, NOWHERE)
     )
     still = SKIN[held[SKIN] > 0.99]
@@ -137,7 +137,7 @@ def test_held_skin_stays() -> None:
 def test_a_movement_fades_with_the_distance_from_what_is_seen() -> None:
     chin = GENERIC.points["chin"]
     seen = vertices_seen(NEUTRAL + np.array([0, 3, 0]), CAMERAS, np.array([chin]))
-    found = move_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE)
+    found = deform_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE)
     moves = np.linalg.norm(found - NEUTRAL, axis=1)[SKIN]
     away = np.linalg.norm(NEUTRAL - NEUTRAL[chin], axis=1)[SKIN]
     assert moves[away < 10].min() > 2
@@ -153,7 +153,7 @@ def test_measured_skin_moves_along_itself(
     """On the forehead, which looks forward."""
     moves = bump(place("nose_root") + np.array([0, 35, 0]), width_mm=20, along=along)
     seen = skin_seen(NEUTRAL + moves, CAMERAS, count=900)
-    found = move_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE, across_sd_mm=across_sd_mm)
+    found = deform_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE, across_sd_mm=across_sd_mm)
     there = FACE[np.linalg.norm(moves[FACE], axis=1) > 1]
     share = ((found - NEUTRAL)[there] @ along).sum() / (moves[there] @ along).sum()
     across = np.abs(((found - NEUTRAL) * MESH.vertex_normals()).sum(axis=1))
@@ -170,11 +170,11 @@ def test_lips_of_an_open_mouth_do_not_drag_each_other() -> None:
     target = mouth_open.copy()
     target[UPPER] += [0, 2, 0]
     both = vertices_seen(target, CAMERAS, np.append(UPPER, LOWER))
-    moves = move_skin(mouth_open, both, CAMERAS, GENERIC, held=NOWHERE) - mouth_open
+    moves = deform_skin(mouth_open, both, CAMERAS, GENERIC, held=NOWHERE) - mouth_open
     assert np.linalg.norm(moves[LOWER], axis=1).max() < 0.1
     np.testing.assert_allclose(moves[UPPER, 1], 2, atol=0.1)
     alone = vertices_seen(target, CAMERAS, UPPER)
-    moves = move_skin(mouth_open, alone, CAMERAS, GENERIC, held=NOWHERE) - mouth_open
+    moves = deform_skin(mouth_open, alone, CAMERAS, GENERIC, held=NOWHERE) - mouth_open
     assert np.linalg.norm(moves[LOWER], axis=1).max() < 1.0, "they hang together at the corners"
 
 
@@ -183,7 +183,7 @@ def test_lips_that_touch_part() -> None:
     target[UPPER] += [0, 1, 0]
     target[LOWER] -= [0, 1, 0]
     seen = vertices_seen(target, CAMERAS, np.append(UPPER, LOWER))
-    moves = move_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE) - NEUTRAL
+    moves = deform_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE) - NEUTRAL
     np.testing.assert_allclose(moves[UPPER, 1], 1, atol=0.1)
     np.testing.assert_allclose(moves[LOWER, 1], -1, atol=0.1)
 
@@ -197,7 +197,7 @@ def test_a_wild_sighting_counts_little(
         **{field.name: getattr(seen, field.name) for field in fields(seen)}
         | {"image_points": wrong}
     )
-    robust = move_skin(NEUTRAL, spoilt, CAMERAS, GENERIC, held=NOWHERE)
+    robust = deform_skin(NEUTRAL, spoilt, CAMERAS, GENERIC, held=NOWHERE)
     assert np.median(np.linalg.norm(robust - found, axis=1)[FACE]) < 0.05
     assert np.linalg.norm(robust - moved, axis=1)[FACE].max() < 1.5
 
@@ -205,5 +205,5 @@ def test_a_wild_sighting_counts_little(
 def test_eyeballs_and_hair_that_are_seen_pull_nothing() -> None:
     ball = np.unique(MESH.triangles[MESH.triangles_of("left_eyeball")])
     seen = vertices_seen(NEUTRAL + np.array([5, 0, 0]), CAMERAS, ball)
-    still = move_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE)
+    still = deform_skin(NEUTRAL, seen, CAMERAS, GENERIC, held=NOWHERE)
     np.testing.assert_allclose(still, NEUTRAL, atol=1e-9)

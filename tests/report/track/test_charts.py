@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mien.report.track.charts import Plot, plots_of
+from mien.report.track.charts import Plot, build_plots
 from mien.track.state import Layout, Track
 from tracks import LAYOUT, random_state, random_track, track_of
 
@@ -24,7 +24,7 @@ def labels(plot: Plot) -> list[str]:
 
 
 def test_what_there_is_to_plot(track: Track) -> None:
-    plots = by_name(plots_of(track))
+    plots = by_name(build_plots(track))
     assert list(plots) == [
         *("rms", "weights_mouth", "weights_eyes", "units"),
         *("eyes", "rotation", "quaternion", "translation"),
@@ -38,7 +38,7 @@ def test_what_there_is_to_plot(track: Track) -> None:
 
 
 def test_numbers_are_the_tracks(track: Track) -> None:
-    plots = by_name(plots_of(track))
+    plots = by_name(build_plots(track))
     found = track.frames[6]
     assert found.state is not None
     joy = plots["weights_eyes"].rows[1]
@@ -51,7 +51,7 @@ def test_numbers_are_the_tracks(track: Track) -> None:
 
 
 def test_truth_brings_errors(track: Track) -> None:
-    plots = by_name(plots_of(track, track))
+    plots = by_name(build_plots(track, track))
     for name in ("rotation", "translation"):
         assert labels(plots[name])[-1].startswith("error")
         errors = plots[name].rows[-1].values
@@ -66,7 +66,7 @@ def test_what_the_truth_does_not_tell_has_none(track: Track, rng: np.random.Gene
     """As where fewer expressions were used than the model has."""
     layout = Layout(("mouth",), ("neutral", "joy"))
     states = [random_state(rng, layout) for _ in track.frames]
-    plots = by_name(plots_of(track, track_of(states, rng, layout=layout)))
+    plots = by_name(build_plots(track, track_of(states, rng, layout=layout)))
     told = {row.label: row.truth is not None for row in plots["weights_mouth"].rows}
     assert told == {"neutral": True, "joy": True, "anger": False}
     assert all(row.truth is None for row in plots["weights_eyes"].rows)
@@ -74,7 +74,7 @@ def test_what_the_truth_does_not_tell_has_none(track: Track, rng: np.random.Gene
 
 def test_a_head_of_neutral_alone_has_no_weights(rng: np.random.Generator) -> None:
     layout = Layout(("mouth",), ("neutral",))
-    plots = by_name(plots_of(random_track(rng, layout=layout)))
+    plots = by_name(build_plots(random_track(rng, layout=layout)))
     assert not any(name.startswith(("weights", "units")) for name in plots)
     assert "eyes" in plots
 
@@ -86,6 +86,6 @@ def test_of_many_units_those_that_move_most(rng: np.random.Generator) -> None:
     states = [
         replace(random_state(rng, layout), units=factor * size) for factor in (0.0, 0.05, 0.1)
     ]
-    plot = by_name(plots_of(track_of(states, rng, layout=layout)))["units"]
+    plot = by_name(build_plots(track_of(states, rng, layout=layout)))["units"]
     assert labels(plot) == [name for index, name in enumerate(names) if index % 5 > 1]
     assert plot.caption.endswith("The 12 of 20 that move most.")

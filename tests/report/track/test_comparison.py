@@ -11,7 +11,7 @@ from mien.camera import Camera
 from mien.errors import InputError
 from mien.head import Head
 from mien.render.picture import HeadRenderer
-from mien.report.track.comparison import draw_tracked, face_pixels, face_psnr
+from mien.report.track.comparison import draw_tracked_head, face_mask, face_psnr
 from mien.rig.followers import part_vertices
 from mien.track.state import Track, TrackedFrame
 from posable import head
@@ -45,22 +45,22 @@ def test_a_face_that_is_known_exactly_is_drawn_exactly(
     renderer: HeadRenderer, track: Track
 ) -> None:
     found = track.frames[0]
-    drawn = draw_tracked(renderer, track, found)
+    drawn = draw_tracked_head(renderer, track, found)
     assert drawn is not None
     frame = filmed(renderer, track, found)
-    assert drawn.inside.mean() > 0.05
-    assert face_psnr(frame, drawn.picture, drawn.inside) > 60
-    np.testing.assert_array_equal(drawn.over(frame), frame)
+    assert drawn.mask.mean() > 0.05
+    assert face_psnr(frame, drawn.picture, drawn.mask) > 60
+    np.testing.assert_array_equal(drawn.blended_over(frame), frame)
 
 
 def test_only_the_face_is_drawn_over_a_frame(renderer: HeadRenderer, track: Track) -> None:
-    drawn = draw_tracked(renderer, track, track.frames[0])
+    drawn = draw_tracked_head(renderer, track, track.frames[0])
     assert drawn is not None
     frame = np.full((track.height, track.width, 3), GREEN, np.uint8)
-    over = drawn.over(frame)
-    np.testing.assert_array_equal(over[~drawn.inside], frame[~drawn.inside])
-    whole = (over == drawn.picture[..., :3]).all(axis=2) & drawn.inside
-    assert 0.5 < whole.sum() / drawn.inside.sum() < 0.95, "softly bordered"
+    over = drawn.blended_over(frame)
+    np.testing.assert_array_equal(over[~drawn.mask], frame[~drawn.mask])
+    whole = (over == drawn.picture[..., :3]).all(axis=2) & drawn.mask
+    assert 0.5 < whole.sum() / drawn.mask.sum() < 0.95, "softly bordered"
 
 
 def test_a_part_of_a_frame(renderer: HeadRenderer, track: Track) -> None:
@@ -68,20 +68,20 @@ def test_a_part_of_a_frame(renderer: HeadRenderer, track: Track) -> None:
     assert found.state is not None
     camera = track.camera(found.state)
     right = replace(camera, width=400, principal_px=camera.principal - [240, 0])
-    whole, part = (draw_tracked(renderer, track, found, item) for item in (camera, right))
+    whole, part = (draw_tracked_head(renderer, track, found, item) for item in (camera, right))
     assert whole is not None
     assert part is not None
-    np.testing.assert_array_equal(part.inside, whole.inside[:, 240:])
+    np.testing.assert_array_equal(part.mask, whole.mask[:, 240:])
 
 
 def test_nothing_is_drawn_where_it_is_lost(renderer: HeadRenderer, track: Track) -> None:
-    assert draw_tracked(renderer, track, track.frames[1]) is None
+    assert draw_tracked_head(renderer, track, track.frames[1]) is None
 
 
 def test_the_face_is_what_is_seen_of_it() -> None:
     made: Head = head()
     facing = Camera(260, 260, 400.0, np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0, 600]))
-    inside = face_pixels(made.mesh, facing)
+    inside = face_mask(made.mesh, facing)
     vertices = made.mesh.vertices
 
     def seen(vertex: Array) -> bool:
@@ -112,7 +112,7 @@ def test_sizes_must_agree(renderer: HeadRenderer, track: Track) -> None:
     frame, mask = np.zeros((4, 6, 3), np.uint8), np.ones((4, 6), bool)
     with pytest.raises(InputError, match="drawn: expected 6x4 px, got 5x4"):
         face_psnr(frame, frame[:, :5], mask)
-    drawn = draw_tracked(renderer, track, track.frames[0])
+    drawn = draw_tracked_head(renderer, track, track.frames[0])
     assert drawn is not None
     with pytest.raises(InputError, match="pixels: expected 640x360 px, got 6x4"):
-        drawn.over(frame)
+        drawn.blended_over(frame)

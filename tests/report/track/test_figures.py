@@ -8,9 +8,9 @@ import pytest
 from PIL import Image
 
 from mien.arrays import Array
-from mien.report.track.charts import Plot, Row, plots_of
-from mien.report.track.figures import limits_of, save_figure, stretches
-from mien.report.track.series import series_of
+from mien.report.track.charts import Plot, Row, build_plots
+from mien.report.track.figures import row_limits, save_figure, true_runs
+from mien.track.series import series_of
 from mien.track.state import Layout, Track
 from tracks import random_state, random_track, track_of
 
@@ -21,7 +21,7 @@ def track(rng: np.random.Generator) -> Track:
 
 
 def saved(path: Path, track: Track, name: str = "weights_mouth") -> Array:
-    plot = next(plot for plot in plots_of(track, track) if plot.name == name)
+    plot = next(plot for plot in build_plots(track, track) if plot.name == name)
     save_figure(path, plot, series_of(track))
     with Image.open(path) as image:
         return np.asarray(image.convert("RGB"))
@@ -45,7 +45,7 @@ def test_lost_frames_are_shaded(tmp_path: Path, track: Track) -> None:
 
 @pytest.mark.parametrize("kind", ["png", "svg"])
 def test_the_same_track_gives_the_same_file(tmp_path: Path, track: Track, kind: str) -> None:
-    plot, series = plots_of(track)[1], series_of(track)
+    plot, series = build_plots(track)[1], series_of(track)
     for name in ("a", "b"):
         save_figure(tmp_path / f"{name}.{kind}", plot, series)
     first, second = ((tmp_path / f"{name}.{kind}").read_bytes() for name in ("a", "b"))
@@ -62,7 +62,7 @@ def test_a_single_frame_is_a_dot(tmp_path: Path, rng: np.random.Generator, name:
 def test_a_track_of_which_all_is_lost(tmp_path: Path, rng: np.random.Generator) -> None:
     track = track_of([None, None, None], rng)
     series = series_of(track)
-    for plot in plots_of(track, track):
+    for plot in build_plots(track, track):
         save_figure(tmp_path / f"{plot.name}.png", plot, series)
 
 
@@ -73,10 +73,10 @@ def test_rows_show_all_their_numbers() -> None:
         Row("c", np.full(3, 7.0)),
         Row("d", np.full(3, np.nan)),
     )
-    found = limits_of(Plot("p", "", "", rows))
+    found = row_limits(Plot("p", "", "", rows))
     np.testing.assert_allclose(found, [[-0.3, 5.3], [-0.06, 1.06], [6.5, 7.5], [-0.06, 1.06]])
-    (alike,) = set(limits_of(Plot("p", "", "", rows[:3], alike=True)))
-    np.testing.assert_allclose(alike, [-0.42, 7.42])
+    (shared_scale,) = set(row_limits(Plot("p", "", "", rows[:3], shared_scale=True)))
+    np.testing.assert_allclose(shared_scale, [-0.42, 7.42])
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_rows_show_all_their_numbers() -> None:
     [("", []), ("0", []), ("1", [(0, 1)]), ("0110100", [(1, 3), (4, 5)]), ("11", [(0, 2)])],
 )
 def test_runs_of_a_mask(mask: str, runs: list[tuple[int, int]]) -> None:
-    assert list(stretches(np.array([digit == "1" for digit in mask], bool))) == runs
+    assert list(true_runs(np.array([digit == "1" for digit in mask], bool))) == runs
 
 
 def test_expressions_of_any_name(tmp_path: Path, rng: np.random.Generator) -> None:

@@ -12,7 +12,12 @@ from mien.capture.video.video import Video
 from mien.errors import InputError
 from mien.render.picture import GREY, HeadRenderer
 from mien.report.track.caption import STATUS_COLOURS
-from mien.report.track.overlay import decoded, held, overlay_frames, write_overlay
+from mien.report.track.overlay import (
+    decode_tracked_frames,
+    overlay_frames,
+    repeat_counts,
+    save_overlay,
+)
 from mien.track.state import Track
 from posable import head
 from tracks import random_state, track_of
@@ -86,13 +91,13 @@ def test_a_frame_reduced_in_size_is_shown_in_full(renderer: HeadRenderer, track:
 def test_frames_keep_their_times_at_a_constant_rate(
     times: list[float], fps: float, counts: list[int]
 ) -> None:
-    rate, found = held(np.array(times), 24.0)
+    rate, found = repeat_counts(np.array(times), 24.0)
     assert rate == pytest.approx(fps, rel=1e-3)
     assert found.tolist() == counts
 
 
 def test_a_clock_rounded_to_milliseconds_does_not_repeat_frames() -> None:
-    rate, counts = held(np.round(np.arange(3000) / 29.97, 3), 1.0)
+    rate, counts = repeat_counts(np.round(np.arange(3000) / 29.97, 3), 1.0)
     assert rate == pytest.approx(29.97, rel=1e-4)
     assert (counts == 1).all()
 
@@ -103,7 +108,7 @@ def test_a_video_of_a_video(tmp_path: Path, track: Track) -> None:
     times = [frame.seconds for frame in Video(clip).frames()]
     found = [replace(f, time=t) for f, t in zip(track.frames, times, strict=False)]
     told: list[tuple[int, int]] = []
-    count = write_overlay(
+    count = save_overlay(
         tmp_path / "out.mp4",
         clip,
         replace(track, frames=tuple(found)),
@@ -124,14 +129,14 @@ def test_a_stream_that_breaks(tmp_path: Path, track: Track, rng: np.random.Gener
     clip = broken(written(tmp_path / "in.mkv", noise))
     readable = sum(1 for _ in Video(clip).frames())
     assert 4 <= readable < 40
-    assert write_overlay(tmp_path / "out.mp4", clip, track, head()) == 4
+    assert save_overlay(tmp_path / "out.mp4", clip, track, head()) == 4
 
 
 def test_only_the_tracks_own_frames(tmp_path: Path, track: Track) -> None:
     clip = written(tmp_path / "in.mp4", frames(6))
     chosen = replace(track, frames=track.frames[1::2])
-    assert [found.frame for _, found in decoded(clip, chosen)] == [1, 3]
-    assert list(decoded(clip, replace(track, frames=()))) == []
+    assert [found.frame for _, found in decode_tracked_frames(clip, chosen)] == [1, 3]
+    assert list(decode_tracked_frames(clip, replace(track, frames=()))) == []
 
 
 def test_another_video_than_the_tracks(tmp_path: Path, track: Track) -> None:
@@ -139,5 +144,5 @@ def test_another_video_than_the_tracks(tmp_path: Path, track: Track) -> None:
     with pytest.raises(
         InputError, match=r"in\.mp4: expected 96x96 px as the track's .*, got 64x64"
     ):
-        write_overlay(tmp_path / "out.mp4", clip, track, head())
+        save_overlay(tmp_path / "out.mp4", clip, track, head())
     assert not (tmp_path / "out.mp4").exists()

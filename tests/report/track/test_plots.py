@@ -9,9 +9,17 @@ import pytest
 
 from filmed import written
 from mien.errors import InputError
-from mien.report.track.charts import plots_of
-from mien.report.track.plots import accuracy, check_plots_place, summary, write_track_plots
-from mien.report.track.series import series_of, truth_for
+from mien.render.picture import GREY
+from mien.report.track.charts import build_plots
+from mien.report.track.plots import (
+    check_plots_place,
+    contact_sheet,
+    error_summary,
+    pick_evenly,
+    save_track_plots,
+    summary,
+)
+from mien.track.series import series_of, truth_for
 from mien.track.state import Layout, Track
 from posable import head
 from tracks import random_state, random_track, track_of
@@ -27,10 +35,10 @@ def track(rng: np.random.Generator) -> Track:
 
 def test_every_plot_and_a_page_that_shows_them(tmp_path: Path, track: Track) -> None:
     told: list[tuple[int, int]] = []
-    files = write_track_plots(
+    files = save_track_plots(
         tmp_path / "a" / "plots", track, progress=lambda *step: told.append(step)
     )
-    names = [plot.name for plot in plots_of(track)]
+    names = [plot.name for plot in build_plots(track)]
     assert [file.name for file in files] == [*(f"{name}.png" for name in names), "index.html"]
     assert {file.name for file in files} == {path.name for path in files[0].parent.iterdir()}
     assert told == [(step, len(files)) for step in range(len(files) + 1)]
@@ -41,7 +49,7 @@ def test_every_plot_and_a_page_that_shows_them(tmp_path: Path, track: Track) -> 
 
 def test_a_contact_sheet_where_there_is_a_video(tmp_path: Path, track: Track) -> None:
     clip = written(tmp_path / "in.mp4", [np.full((48, 64, 3), 90, np.uint8)] * 3)
-    files = write_track_plots(tmp_path / "plots", track, video=clip, head=head(), kind="svg")
+    files = save_track_plots(tmp_path / "plots", track, video=clip, head=head(), kind="svg")
     assert files[0].name == "sheet.jpg"
     assert '<img src="sheet.jpg"' in files[-1].read_text(encoding="utf-8")
     assert files[1].read_text(encoding="utf-8").startswith("<?xml")
@@ -50,13 +58,13 @@ def test_a_contact_sheet_where_there_is_a_video(tmp_path: Path, track: Track) ->
 def test_other_files_are_left_alone(tmp_path: Path, track: Track) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     (tmp_path / "rms.png").write_text("old")
-    write_track_plots(tmp_path, track)
+    save_track_plots(tmp_path, track)
     assert (tmp_path / "mine.txt").read_text() == "mine"
     assert (tmp_path / "rms.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_title_is_escaped(tmp_path: Path, track: Track) -> None:
-    page = write_track_plots(tmp_path, track, title="a <b> & c")[-1].read_text(encoding="utf-8")
+    page = save_track_plots(tmp_path, track, title="a <b> & c")[-1].read_text(encoding="utf-8")
     assert "<h1>a &lt;b&gt; &amp; c</h1>" in page
 
 
@@ -80,31 +88,31 @@ def test_its_distance_from_the_truth(rng: np.random.Generator) -> None:
         for found in track.frames
     )
     truth = truth_for(track, track)
-    told = dict(accuracy(series_of(replace(track, frames=moved)), truth))
+    told = dict(error_summary(series_of(replace(track, frames=moved)), truth))
     assert told == {
         "rotation off by, degrees": "0.000 on average, 0.000 at most",
         "translation off by, % of the distance": "1.000 on average, 1.000 at most",
         "weights off by": "0.000 on average, 0.000 at most",
     }
     lost = series_of(track_of([None] * 9, rng))
-    assert dict(accuracy(lost, truth))["weights off by"] == "not known"
+    assert dict(error_summary(lost, truth))["weights off by"] == "not known"
 
 
 def test_a_track_of_which_all_is_lost(tmp_path: Path, rng: np.random.Generator) -> None:
     track = track_of([None, None], rng, layout=SMALL)
-    page = write_track_plots(tmp_path, track, reference=track)[-1].read_text(encoding="utf-8")
+    page = save_track_plots(tmp_path, track, reference=track)[-1].read_text(encoding="utf-8")
     assert "RMS error, grey levels" not in page
     assert "not known" in page
 
 
 def test_nothing_to_plot(tmp_path: Path, track: Track) -> None:
     with pytest.raises(InputError, match="track: expected at least one frame, got none"):
-        write_track_plots(tmp_path, replace(track, frames=()))
+        save_track_plots(tmp_path, replace(track, frames=()))
     with pytest.raises(InputError, match="kind: expected png or svg, got pdf"):
-        write_track_plots(tmp_path, track, kind="pdf")
+        save_track_plots(tmp_path, track, kind="pdf")
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="file"):
-        write_track_plots(tmp_path / "file", track)
+        save_track_plots(tmp_path / "file", track)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
@@ -118,4 +126,35 @@ def test_another_page_is_left_alone(tmp_path: Path) -> None:
 def test_plots_may_be_drawn_again(tmp_path: Path, track: Track) -> None:
     for _ in range(2):
         check_plots_place(tmp_path / "plots")
-        write_track_plots(tmp_path / "plots", track)
+        save_track_plots(tmp_path / "plots", track)
+
+
+@pytest.fixture
+def clip_track(rng: np.random.Generator) -> Track:
+    made = track_of([random_state(rng), None, random_state(rng)], rng)
+    return replace(made, width=80, height=60, focal_px=150.0)
+
+
+def test_first_and_last_and_evenly_between(rng: np.random.Generator) -> None:
+    track = random_track(rng)
+    assert [found.frame for found in pick_evenly(track, 3).frames] == [0, 4, 8]
+    assert pick_evenly(track, 1).frames == track.frames[:1]
+    assert pick_evenly(track, 99) == track
+
+
+@pytest.mark.parametrize(("columns", "shape"), [(3, (120, 248)), (2, (244, 164)), (9, (120, 248))])
+def test_frames_above_what_was_found(
+    clip_track: Track, columns: int, shape: tuple[int, int]
+) -> None:
+    track = clip_track
+    frames = [np.full((60, 80, 3), 60 * (index + 1), np.uint8) for index in range(3)]
+    pairs = zip(frames, track.frames, strict=True)
+    sheet = contact_sheet(pairs, track, head(), columns=columns)
+    assert sheet.shape == (*shape, 3)
+    for index, frame in enumerate(frames):
+        row, column = divmod(index, columns)
+        top, left = 124 * row, 84 * column
+        cell = sheet[top : top + 120, left : left + 80]
+        assert (cell[20:60] == frame[20:]).all(), "but for its number"
+        drawn = (cell[60:] != GREY).any(axis=2).mean()
+        assert drawn < 0.1 if track.frames[index].state is None else drawn > 0.2

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mien.report.track.window import Window, window_of
+from mien.report.track.window import Window, crop_window
 from mien.track.state import Track
 from posable import head
 from tracks import random_state, track_of
@@ -19,14 +19,14 @@ def track(rng: np.random.Generator) -> Track:
 
 
 def test_the_whole_frame_where_there_is_room(track: Track) -> None:
-    window = window_of(track, HEAD, (640, 400))
+    window = crop_window(track, HEAD, (640, 400))
     assert window == Window(0, 0, 640, 360, 1.0)
     assert window.size == (640, 360)
 
 
 @pytest.mark.parametrize("limits", [(600, 400), (200, 400), (600, 90)])
 def test_where_the_head_goes_where_there_is_not(track: Track, limits: tuple[int, int]) -> None:
-    window = window_of(track, HEAD, limits)
+    window = crop_window(track, HEAD, limits)
     assert (np.array(window.size) <= limits).all()
     assert all(side % 2 == 0 for side in window.size)
     assert 0 < window.left < window.right < track.width
@@ -40,7 +40,7 @@ def test_where_the_head_goes_where_there_is_not(track: Track, limits: tuple[int,
 
 
 def test_its_camera_sees_what_it_shows(track: Track) -> None:
-    window = window_of(track, HEAD, (200, 400))
+    window = crop_window(track, HEAD, (200, 400))
     assert window.factor < 1
     state = track.frames[0].state
     assert state is not None
@@ -53,18 +53,18 @@ def test_a_frame_is_cut_alike_in_any_size(track: Track) -> None:
     rows, columns = np.mgrid[:360, :640]
     frame = np.stack([columns * 255 // 640, rows * 255 // 360, 0 * rows], axis=2).astype(np.uint8)
     window = Window(160, 40, 480, 200, 0.5)
-    cut = window.cut(frame, track)
+    cut = window.crop(frame, track)
     assert cut.shape == (80, 160, 3)
     np.testing.assert_allclose(cut[0, 0, :2], [255 * 161 / 640, 255 * 41 / 360], atol=1)
-    half = window.cut(np.ascontiguousarray(frame[::2, ::2]), track)
+    half = window.crop(np.ascontiguousarray(frame[::2, ::2]), track)
     assert np.abs(half.astype(int) - cut).max() <= 2
 
 
 def test_a_track_that_never_found_the_head(rng: np.random.Generator) -> None:
-    window = window_of(track_of([None, None], rng), HEAD, (320, 400))
+    window = crop_window(track_of([None, None], rng), HEAD, (320, 400))
     assert window == Window(0, 0, 640, 360, 0.5)
 
 
 def test_a_head_that_is_outside_of_the_frames(rng: np.random.Generator) -> None:
     state = replace(random_state(rng), t_cam_head=np.array([5000.0, 0, 700]))
-    assert window_of(track_of([state], rng), HEAD, (320, 400)) == Window(0, 0, 640, 360, 0.5)
+    assert crop_window(track_of([state], rng), HEAD, (320, 400)) == Window(0, 0, 640, 360, 0.5)

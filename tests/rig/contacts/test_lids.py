@@ -116,7 +116,7 @@ def resolved_by_rounds(lids: Lids, vertices: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("blink", "squint"), [(1.0, 1.0), (0.8, 0.6), (0.4, 0.0), (1.4, 0.0)])
-def test_lids_give_way_by_half_each(rigged: Rigged, blink: float, squint: float) -> None:
+def test_each_lid_moves_by_half(rigged: Rigged, blink: float, squint: float) -> None:
     weights = {"eyeBlinkLeft": blink, "eyeBlinkRight": blink, "eyeSquintLeft": squint}
     posed = rigged.posed(**weights, eyeLookDownLeft=0.7, cheekSquintRight=0.5)
     for lids in rigged.deformer.contacts.lids:
@@ -128,7 +128,7 @@ def test_lids_give_way_by_half_each(rigged: Rigged, blink: float, squint: float)
         np.testing.assert_allclose(0 if again is None else again, moved, atol=1e-9)
 
 
-def test_places_and_back(rigged: Rigged) -> None:
+def test_spherical_coordinates_round_trip(rigged: Rigged) -> None:
     lids = Lids.of(GENERIC, rigged.neutral, "left")
     again = lids.from_spherical(lids.spherical(rigged.neutral))
     np.testing.assert_allclose(again, rigged.neutral[lids.vertices], atol=1e-9)

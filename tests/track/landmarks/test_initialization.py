@@ -1,4 +1,4 @@
-"""Head and face found anew from landmarks that are known exactly."""
+"""Pose and face from landmarks without errors."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 import posable
-from marked import FOCAL, LAYOUT, SIZE, Blind, Shown, face_of, posed, prepared, starter
+from marked import FOCAL, LAYOUT, SIZE, Blind, Shown, face_of, head_detector, posed, prepared
 from mien.assets.landmark_sets import LANDMARK_COUNT
 from mien.camera import Camera
 from mien.capture.faces.mediapipe_face import DetectedFace
 from mien.errors import InputError
 from mien.numeric.rotation import angle_between, rotation_from_vector
-from mien.track.landmarks.fit import Guess, MarkProblem, Observation, bounded_step
-from mien.track.landmarks.initialization import Starter
+from mien.track.landmarks.fit import LandmarkObservation, LandmarkProblem, PoseAndFace, bounded_step
+from mien.track.landmarks.initialization import HeadDetector
 from mien.track.state import Layout, TrackState
 
 
 def found(face: DetectedFace) -> TrackState:
-    fit = starter().fit(face, size=SIZE, focal_px=FOCAL)
+    fit = head_detector().fit(face, size=SIZE, focal_px=FOCAL)
     assert fit is not None
     return fit.state
 
@@ -57,7 +57,7 @@ def test_blink_of_one_eye() -> None:
     np.testing.assert_allclose(found(face_of(truth)).units, [0.9, 0.0], atol=0.12)
 
 
-def test_a_quarter_of_the_landmarks_astray_is_ignored(rng: np.random.Generator) -> None:
+def test_a_quarter_of_outliers_is_ignored(rng: np.random.Generator) -> None:
     truth = posed()
     noise = np.zeros((LANDMARK_COUNT, 2))
     noise[rng.permutation(LANDMARK_COUNT)[: LANDMARK_COUNT // 4]] = (60.0, 40.0)
@@ -65,8 +65,8 @@ def test_a_quarter_of_the_landmarks_astray_is_ignored(rng: np.random.Generator) 
 
 
 @pytest.mark.parametrize("degrees", [(0.0, 0.0), (14.0, 0.0), (-10.0, 8.0)])
-def test_eyes_look_where_their_irises_say(degrees: tuple[float, float]) -> None:
-    truth, marks = posed(), starter().marks
+def test_gaze_follows_the_irises(degrees: tuple[float, float]) -> None:
+    truth, model = posed(), head_detector().model
     camera = Camera(*SIZE, FOCAL, truth.R_cam_head, truth.t_cam_head)
     face = face_of(truth)
     points = face.points.copy()
@@ -76,13 +76,13 @@ def test_eyes_look_where_their_irises_say(degrees: tuple[float, float]) -> None:
         centre = eyes.vertices[ball].mean(axis=0)
         yaw, pitch = np.radians(degrees)
         about_y, about_x = rotation_from_vector(np.array([[0, yaw, 0], [-pitch, 0, 0]]))
-        place = centre + about_y @ about_x @ (marks.places[iris] - centre)
+        place = centre + about_y @ about_x @ (model.positions[iris] - centre)
         points[iris, :2] = camera.project(place[None])[0]
     state = found(DetectedFace(points, face.blendshapes, face.R_cam_head))
     np.testing.assert_allclose(np.degrees(state.gaze), degrees, atol=1.0)
 
 
-def test_shut_eyes_look_nowhere() -> None:
+def test_closed_eyes_have_no_gaze() -> None:
     face = face_of(posed())
     points = face.points.copy()
     for upper, lower, iris in ((386, 374, 473), (159, 145, 468)):
@@ -92,7 +92,7 @@ def test_shut_eyes_look_nowhere() -> None:
     np.testing.assert_array_equal(state.gaze, 0)
 
 
-def test_landmarks_outside_of_the_picture_say_nothing() -> None:
+def test_landmarks_outside_of_the_picture_have_no_weight() -> None:
     truth = replace(posed(), t_cam_head=np.array([230.0, -20.0, 600.0]))
     face = face_of(truth)
     outside = face.points[:, 0] > SIZE[0]
@@ -108,11 +108,11 @@ def test_landmarks_outside_of_the_picture_say_nothing() -> None:
 
 def test_no_face_is_no_state() -> None:
     pixels = np.zeros((480, 640, 3), np.uint8)
-    assert starter().find(pixels, focal_px=FOCAL) == []
-    assert starter().find_at(pixels, posed().t_cam_head, focal_px=FOCAL) is None
+    assert head_detector().detect(pixels, focal_px=FOCAL) == []
+    assert head_detector().detect_near(pixels, posed().t_cam_head, focal_px=FOCAL) is None
 
 
-def test_a_small_face_is_looked_at_again_from_near_by(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_small_face_is_detected_again_in_a_crop(monkeypatch: pytest.MonkeyPatch) -> None:
     face = face_of(posed())
     corner = np.array([2000.0, 1000.0, 0.0])
     small = DetectedFace(face.points + corner, face.blendshapes, face.R_cam_head)
@@ -122,8 +122,8 @@ def test_a_small_face_is_looked_at_again_from_near_by(monkeypatch: pytest.Monkey
     cut_at = np.floor((low + high) / 2 - 0.75 * rough.width)
     near = DetectedFace(small.points - [*cut_at, 0.0], face.blendshapes, face.R_cam_head)
     again = Shown(rough, near)
-    monkeypatch.setattr(starter(), "_detector", again)
-    (seen,) = starter().look(pixels)
+    monkeypatch.setattr(head_detector(), "_detector", again)
+    (seen,) = head_detector().detect_faces(pixels)
     assert again.sizes[0] == (3840, 2160)
     assert max(again.sizes[1]) < 600
     np.testing.assert_allclose(seen.points, small.points, atol=1e-9)
@@ -143,39 +143,41 @@ def test_head_with_neutral_only_is_fitted_by_its_units() -> None:
 
 def test_layout_that_is_not_the_heads() -> None:
     with pytest.raises(InputError, match="unit: expected one of the head's"):
-        Starter(posable.head(), Layout(("mouth",), posable.NAMES, ("wink",)), Blind())
+        HeadDetector(posable.head(), Layout(("mouth",), posable.NAMES, ("wink",)), Blind())
 
 
-def test_what_the_detector_errs_by_in_a_picture_of_the_guess_is_taken_off() -> None:
+def test_errors_in_a_rendered_picture_of_the_estimate_are_subtracted() -> None:
     truth, errors = posed(), np.array([4.0, -3.0])
-    marks, camera = starter().marks, Camera(*SIZE, FOCAL, truth.R_cam_head, truth.t_cam_head)
-    guess = Guess(truth.R_cam_head, truth.t_cam_head, np.zeros(len(marks.moves)))
+    model, camera = head_detector().model, Camera(*SIZE, FOCAL, truth.R_cam_head, truth.t_cam_head)
+    estimate = PoseAndFace(truth.R_cam_head, truth.t_cam_head, np.zeros(len(model.offsets)))
     wrong = face_of(truth, noise=errors)
-    seen = Observation.of(marks, wrong, SIZE)
-    corrected = seen.against(wrong, guess, SIZE, FOCAL)
-    wanted = camera.project(seen.places) - np.array(SIZE) / 2
+    seen = LandmarkObservation.from_detection(model, wrong, SIZE)
+    corrected = seen.bias_corrected(wrong, estimate, SIZE, FOCAL)
+    wanted = camera.project(seen.positions) - np.array(SIZE) / 2
     np.testing.assert_allclose(seen.image_points, wanted + errors, atol=1e-9)
     np.testing.assert_allclose(corrected.image_points, wanted, atol=1e-9)
 
 
-def test_equations_of_a_face_are_slopes_of_its_cost(rng: np.random.Generator) -> None:
-    one = starter()
-    drifting = replace(one.marks, drift=rng.normal(size=(3, LANDMARK_COUNT, 3)))
+def test_gradient_matches_differences_of_the_cost(rng: np.random.Generator) -> None:
+    one = head_detector()
+    drifting = replace(one.model, view_slopes=rng.normal(size=(3, LANDMARK_COUNT, 3)))
     truth = posed()
-    seen = Observation.of(drifting, face_of(truth, noise=rng.normal(size=(478, 2))), SIZE)
-    face = rng.uniform(0.1, 0.3, len(drifting.moves))
-    guess = Guess(truth.R_cam_head, truth.t_cam_head, face)
-    problem = MarkProblem(seen, LAYOUT, FOCAL, near=guess)
-    _, gradient = problem.normal_equations(guess)
+    seen = LandmarkObservation.from_detection(
+        drifting, face_of(truth, noise=rng.normal(size=(478, 2))), SIZE
+    )
+    face = rng.uniform(0.1, 0.3, len(drifting.offsets))
+    estimate = PoseAndFace(truth.R_cam_head, truth.t_cam_head, face)
+    problem = LandmarkProblem(seen, LAYOUT, FOCAL, initial=estimate)
+    _, gradient = problem.normal_equations(estimate)
     moves = np.delete(np.arange(len(gradient)), 6)  # All but the focal length.
     for index, unknown in enumerate(moves):
         step = np.zeros(len(moves))
         step[index] = 1e-5
-        slope = problem.cost(guess.moved(step)) - problem.cost(guess.moved(-step))
+        slope = problem.cost(estimate.plus(step)) - problem.cost(estimate.plus(-step))
         assert gradient[unknown] == pytest.approx(slope / 2e-5, rel=1e-4, abs=1e-4)
 
 
-def test_a_step_between_bounds_is_the_lowest_place(rng: np.random.Generator) -> None:
+def test_bounded_step_decreases_the_quadratic_within_bounds(rng: np.random.Generator) -> None:
     root = rng.normal(size=(12, 6))
     hessian, gradient = root.T @ root, rng.normal(size=6) * 4
     low, high = np.full(6, -0.2), np.full(6, 0.3)

@@ -44,7 +44,7 @@ class LandmarkDetector:
     """Finds a face and its landmarks. Use as a context manager, or call `close`.
 
     Raises:
-        MienError: a shared library of the system is missing; says which.
+        MienError: a shared library of the system is missing; names it.
     """
 
     def __init__(self) -> None:
@@ -74,7 +74,7 @@ class LandmarkDetector:
         two passes reveals a false detection, as in photos that lie on their side.
 
         Args:
-            photo: upright as far as its file says.
+            photo: upright by what its file states.
             face: which one, counted from 1 from left to right in the photo.
 
         Raises:

@@ -39,7 +39,7 @@ class FaceSeries:
 
     Attributes:
         source: the video or the folder.
-        is_video: which of both.
+        is_video: whether it is a video.
         files: of a folder, each picture's file; of a video, empty.
         names: of the pictures: `frame_000123.png`, `smile.jpg`, or `joy/smile.jpg` in a folder of
             one folder an expression.
@@ -48,8 +48,8 @@ class FaceSeries:
         scores: of the same; `index` counts frames or photos from 0.
         seconds: of a video's frames, since its beginning.
         max_side: px; larger pictures are reduced to it.
-        quarters: turns counterclockwise of a video's frames, beyond what its file says.
-        left_out: why, by name, of the pictures in which no face can be used.
+        quarters: turns counterclockwise of a video's frames, beyond those that its file states.
+        left_out: the reason by name for every picture in which no face can be used.
         notes: what was clip_notes.
     """
 

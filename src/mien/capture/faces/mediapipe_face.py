@@ -124,7 +124,7 @@ class FaceNetwork:
     """The network, loaded once (0.3 s). Use as a context manager, or call `close`.
 
     Raises:
-        MienError: a shared library of the system is missing; says which.
+        MienError: a shared library of the system is missing; names it.
     """
 
     def __init__(self, model: Path) -> None:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 _SPACE = slice(16, 20)
-"""Where a colour profile says which channels it is for."""
+"""Bytes of a colour profile that name its colour space."""
 
 
 def to_eight_bits(image: Image, notes: list[str]) -> Image:

@@ -31,8 +31,8 @@ FORMATS = (
     "HEIF",
     "AVIF",
 )
-"""Pillow's names of what is read. Pillow knows more kinds, and for some of them, as PostScript, it
-starts a program that runs what the file says."""
+"""Pillow's names of the formats that are read. Pillow has others, and for some, as PostScript, it
+starts a program that runs the file's code."""
 
 _EXPECTED = "an image (JPEG, PNG, HEIC, ...)"
 

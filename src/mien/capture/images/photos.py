@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mien.arrays import Array, UInt8, check_image, check_positive, frozen
+from mien.capture.images.colour import convert_to_srgb, to_eight_bits, tone_map_hdr
 from mien.capture.images.exif import focal_prior_px, orientation
+from mien.capture.images.jpeg2000 import eight_bits_if_deep
 from mien.capture.images.opening import open_image
 from mien.reading.names import check_path, portable_name
 
@@ -91,7 +93,7 @@ def load_photo(path: str | Path, *, max_side: int = DEFAULT_MAX_SIDE) -> Photo:
         focal_per_px, focal_note = focal_prior_px(image)
         notes += focal_note
         small = _shrunk_rgb(image, max_side, notes)
-        # Asked for once the pixels are there: some decoders turn them, and say so only then.
+        # After the pixels are decoded: some decoders turn them and report it only then.
         turn = orientation(image)
         upright = _turned(small, turn)
         pixels = np.asarray(upright)
@@ -123,9 +125,6 @@ def _shrunk_rgb(image: Image, max_side: int, notes: list[str]) -> Image:
     picture is then held only once.
     """
     from PIL import Image
-
-    from mien.capture.images.colour import convert_to_srgb, to_eight_bits, tone_map_hdr
-    from mien.capture.images.jpeg2000 import eight_bits_if_deep
 
     factor = min(1.0, max_side / max(image.size))
     target = max(1, round(image.width * factor)), max(1, round(image.height * factor))

@@ -21,7 +21,7 @@ _BY_SUFFIX = {suffix: advice for suffixes, advice in _KINDS for suffix in suffix
 
 
 def unsupported_kind(path: Path) -> str:
-    """`a .cr3 file (camera RAW: export as JPEG or TIFF)`; "" if the name says no such thing."""
+    """`a .cr3 file (camera RAW: export as JPEG or TIFF)`; "" for other names."""
     suffix = path.suffix.lower()
     return f"a {suffix} file ({_BY_SUFFIX[suffix]})" if suffix in _BY_SUFFIX else ""
 

@@ -48,7 +48,7 @@ class LiveSource(Protocol):
         width: of the upright pictures, px.
         height: of the upright pictures, px.
         fps: frames a second, as stated.
-        dropped: how many pictures came while nobody was ready for them.
+        dropped: how many pictures were not read in time.
         notes: what was odd; grows while frames are read.
     """
 

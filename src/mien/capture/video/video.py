@@ -48,7 +48,7 @@ CONTAINERS = (
     "aac",
     "flac",
 )
-"""FFmpeg's names of what is read. It knows others, which are lists of files or addresses that it
+"""FFmpeg's names of the formats that are read. It has others: lists of files or addresses that it
 would open, or single pictures."""
 
 _OPTIONS = {"format_whitelist": ",".join(CONTAINERS), "protocol_whitelist": "file"}
@@ -133,7 +133,7 @@ class Video:
 
     Attributes:
         path: the file.
-        quarters: turns counterclockwise of every picture, beyond what the file says.
+        quarters: turns counterclockwise of every picture, beyond those that the file states.
         notes: grow while frames are read: a stream that breaks, frames that cannot be decoded.
     """
 
@@ -210,7 +210,7 @@ def is_video(path: Path) -> bool:
 def _open(path: Path) -> InputContainer:
     import av
 
-    # Up to PyAV 18 text that is not UTF-8 fails unless told not to.
+    # Up to PyAV 18 text that is not UTF-8 fails by default.
     lenient = {"metadata_errors": "replace"} if int(av.__version__.split(".")[0]) < 19 else {}
     try:
         # Without "file:" a name like "concat:a" would be an address.
@@ -248,7 +248,7 @@ def _decoded(container: InputContainer, stream: VideoStream, quarters: int) -> I
 
 def _sixteen_bits(raw: VideoFrame, width: int, height: int, how: str) -> UInt16[Array, "h w 3"]:
     """R'G'B' of an HDR picture over the full range."""
-    # BT.2020's is what such a picture is coded with where the file does not say.
+    # BT.2020 is the default of HDR pictures whose file states no matrix.
     matrix = _BT2020 if raw.colorspace == _UNSPECIFIED else raw.colorspace
     # Planes, as FFmpeg 8.0 spoils pictures whose 16 bits are not in planes.
     shown = raw.reformat(width, height, "gbrp16le", src_colorspace=matrix, interpolation=how)

@@ -45,7 +45,7 @@ class _BgrPicture:
 
 
 def open_camera(number: int) -> CaptureDevice:
-    """Camera 0, 1, … of this computer. Raises: InputError: there is none, or it is not ours."""
+    """Camera 0, 1, … of this computer. Raises: InputError: there is none, or no access."""
     import cv2
 
     log = cv2.utils.logging

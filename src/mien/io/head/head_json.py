@@ -160,7 +160,7 @@ def _view_to_json(view: FittedView) -> Json:
         "t_cam_head_mm": camera.t_cam_head.tolist(),
         "rms_px": float(view.rms_px),
         "points_used": int(view.points_used),
-        "distrusted": dict(view.distrusted),
+        "distrusted": dict(view.outliers),
         "gains": view.gains.tolist(),
     }
 
@@ -186,7 +186,7 @@ def _view_from_json(item: Json, place: str) -> FittedView:
             camera=camera,
             rms_px=as_number(need(item, "rms_px", place), f"{place}.rms_px", least=0),
             points_used=as_whole(need(item, "points_used", place), f"{place}.points_used", least=0),
-            distrusted=texts_from_json(item, "distrusted", place),
+            outliers=texts_from_json(item, "distrusted", place),
             gains=numbers("gains", 3) if "gains" in item else np.ones(3),
         )
     except InputError as error:

@@ -13,7 +13,7 @@ from mien.errors import FileFormatError
 from mien.io.files.atomic import atomic_file
 from mien.limits import MAX_POINTS_BYTES
 from mien.reading.files import read_text
-from mien.reading.text_numbers import Numbers
+from mien.reading.text_numbers import NumberReader
 
 __all__ = ["IBUG_SHARED", "load_pts", "points_from_ibug", "points_to_ibug", "save_pts"]
 
@@ -87,7 +87,7 @@ def load_pts(path: str | Path) -> Float[Array, "n 2"]:
         raise FileFormatError(path, f"expected {expected}")
     # As many blank lines as there were lines before, for the same reason.
     body = "\n" * text[: found.start(2)].count("\n") + found[2]
-    numbers = Numbers(path, "points", body)
+    numbers = NumberReader(path, "points", body)
     points = []
     while not numbers.at_end:
         points.append((numbers.finite("x"), numbers.finite("y of a point")))

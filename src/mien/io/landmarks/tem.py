@@ -13,7 +13,7 @@ from mien.assets.feature_points import FeatureLayout
 from mien.errors import InputError, OtherPointsError
 from mien.io.files.atomic import atomic_file
 from mien.io.landmarks.tem_templates import TEMPLATES
-from mien.reading.text_numbers import Numbers
+from mien.reading.text_numbers import NumberReader
 
 __all__ = ["Delineation", "TemLine", "load_tem", "points_from_tem", "points_to_tem", "save_tem"]
 
@@ -46,7 +46,7 @@ def load_tem(path: str | Path) -> Delineation:
         InputError: the file cannot be read.
         FileFormatError: no delineation; says where.
     """
-    numbers = Numbers(path, "a .tem delineation")
+    numbers = NumberReader(path, "a .tem delineation")
     count = numbers.count("number of points")
     points = [(numbers.finite("a point"), numbers.finite("a point")) for _ in range(count)]
     lines = [_line(numbers, count) for _ in range(0 if numbers.at_end else numbers.whole("lines"))]
@@ -54,7 +54,7 @@ def load_tem(path: str | Path) -> Delineation:
     return Delineation(np.array(points), tuple(lines))
 
 
-def _line(numbers: Numbers, count: int) -> TemLine:
+def _line(numbers: NumberReader, count: int) -> TemLine:
     closed = numbers.whole("a line: 0 for open or 1 for closed", below=2) == 1
     length = numbers.count("number of a line's points")
     points = [numbers.whole("a line's point", below=count) for _ in range(length)]

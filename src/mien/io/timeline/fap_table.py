@@ -2,7 +2,7 @@
 
 Source:
     ISO/IEC 14496-2 annex C, table C-1; where the feature points lie on this mesh is a choice of
-    ours, listed in docs/reference/timeline.md.
+    ours, listed in docs/reference/fap.md.
 """
 
 from __future__ import annotations

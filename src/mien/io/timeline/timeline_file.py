@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from mien.animate.channels import MEMBERS, REGION_NAMES, UNITS, split
+from mien.animate.channels import CHANNEL_NAMES, REGION_NAMES, UNITS, split_channel
 from mien.animate.timeline import Timeline, Tracks
 from mien.errors import FileFormatError, InputError
 from mien.reading.strict_json import unknown_name
@@ -59,8 +59,8 @@ def check_timeline(
         FileFormatError: names the place, suggests the nearest names.
     """
     for place, channel in _channels(timeline):
-        group, name = split(channel)
-        if group in MEMBERS:
+        group, name = split_channel(channel)
+        if group in CHANNEL_NAMES:
             continue
         if group != UNITS and group not in regions:
             raise FileFormatError(path, unknown_name("region", group, regions), place)

@@ -12,7 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from mien.animate.channels import ANGLES, GAZE, HEAD, MEMBERS, REGION_NAMES, UNITS, split
+from mien.animate.channels import (
+    ANGLES,
+    CHANNEL_NAMES,
+    GAZE,
+    HEAD,
+    REGION_NAMES,
+    UNITS,
+    split_channel,
+)
 from mien.animate.curves import Curve
 from mien.animate.layers import GENERATORS, Generator
 from mien.animate.timeline import PIVOT_MM, Clip, Layer, Placement, Timeline, Tracks
@@ -121,7 +129,7 @@ def _tracks(data: dict[str, Any], above: str) -> dict[str, Curve]:
     tracks = {}
     groups = (HEAD, GAZE, UNITS, *REGION_NAMES)
     for group, members in as_object(data.get("tracks", {}), place, groups).items():
-        inside = as_object(members, f"{place}.{group}", MEMBERS.get(group))
+        inside = as_object(members, f"{place}.{group}", CHANNEL_NAMES.get(group))
         for name, track in inside.items():
             curve = curve_from_json(track, join(f"{place}.{group}", name))
             channel = f"{group}.{name}"
@@ -211,7 +219,7 @@ def _motion_to_json(tracks: Tracks, placements: tuple[Placement, ...]) -> dict[s
     data: dict[str, Any] = {}
     groups: dict[str, dict[str, Any]] = {}
     for channel, curve in tracks.items():
-        group, name = split(channel)
+        group, name = split_channel(channel)
         shown = curve.scaled(180 / math.pi) if channel in ANGLES else curve
         groups.setdefault(group, {})[name] = curve_to_json(shown)
     if groups:

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mien.animate.from_track import FACING
 from mien.arrays import Array, Float
+from mien.camera import FRONTAL
 from mien.errors import InputError
 from mien.io.files.atomic import atomic_file
 from mien.io.live.live_link import LOOK_RANGE
@@ -122,7 +122,7 @@ def pose_angles(R_cam_head: Float[Array, "3 3"]) -> Float[Array, " 3"]:
     """
     from scipy.spatial.transform import Rotation
 
-    return Rotation.from_matrix(R_cam_head @ FACING).as_euler("XYZ")
+    return Rotation.from_matrix(R_cam_head @ FRONTAL).as_euler("XYZ")
 
 
 def gaze_vectors(

@@ -31,8 +31,8 @@ def kernel_folders() -> tuple[Path, ...]:
     """Folders to read compiled kernels from; the first is written to; () where none can be.
 
     In order: NUMBA_CACHE_DIR, the package's own __pycache__, the user's folder for caches, a
-    private one among temporary files. A package that cannot be written to is still read: whoever
-    installed it may have run it once.
+    private one among temporary files. A package that cannot be written to is still read: its
+    installer may have run it once.
     """
     own = PACKAGE / "__pycache__"
     passed: tuple[Path, ...] = ()

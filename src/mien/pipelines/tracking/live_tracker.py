@@ -12,9 +12,9 @@ from functools import partial
 from statistics import median
 from typing import Protocol
 
-from mien.animate.from_track import FACING
 from mien.animate.timeline import Moment
 from mien.arrays import Array, UInt8
+from mien.camera import FRONTAL
 from mien.capture.video.live_source import LiveSource, PacedVideo
 from mien.head import Head
 from mien.pipelines.tracking.streams import Stream, parse_stream
@@ -180,7 +180,7 @@ def moment_of(frame: TrackedFrame, layout: Layout) -> Moment | None:
     state = frame.state
     if state is None:
         return None
-    rotation, translation = FACING.T @ state.R_cam_head, FACING.T @ state.t_cam_head
+    rotation, translation = FRONTAL.T @ state.R_cam_head, FRONTAL.T @ state.t_cam_head
     return Moment(frame.time, state.face(layout), rotation, translation)
 
 

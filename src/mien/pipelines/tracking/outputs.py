@@ -97,13 +97,13 @@ class TrackFiles:
 
     def _draw(self, track: Track, video: Video, renderer: HeadRenderer, tell: Progress) -> None:
         if self.overlay:
-            from mien.report.track.overlay import write_overlay
+            from mien.report.track.overlay import save_overlay
 
-            write_overlay(self.overlay, video, track, renderer, progress=partial(tell, OVERLAY))
+            save_overlay(self.overlay, video, track, renderer, progress=partial(tell, OVERLAY))
         if self.plots:
-            from mien.report.track.plots import write_track_plots
+            from mien.report.track.plots import save_track_plots
 
-            write_track_plots(
+            save_track_plots(
                 self.plots,
                 track,
                 title=portable_name(video.path),

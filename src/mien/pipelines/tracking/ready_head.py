@@ -8,7 +8,7 @@ from functools import cached_property
 from mien.capture.faces.detector import LandmarkDetector
 from mien.head import Head
 from mien.track.face_model import FaceModel
-from mien.track.landmarks.initialization import Starter
+from mien.track.landmarks.initialization import HeadDetector
 from mien.track.tracker import Tracker, TrackOptions
 
 
@@ -26,9 +26,9 @@ class ReadyHead:
         return FaceModel(self.head, units=self.options.units)
 
     @cached_property
-    def starter(self) -> Starter:
+    def head_detector(self) -> HeadDetector:
         """What finds it in them."""
-        return Starter(self.head, self.model.layout, self.detector, rig=self.model.rig)
+        return HeadDetector(self.head, self.model.layout, self.detector, rig=self.model.rig)
 
     def tracker(self, width: int, height: int, focal_px: float) -> Tracker:
         """Before the first of pictures of this size, upright, px."""
@@ -40,5 +40,5 @@ class ReadyHead:
             detector=self.detector,
             options=self.options,
             model=self.model,
-            starter=self.starter,
+            head_detector=self.head_detector,
         )

@@ -80,7 +80,7 @@ class Adjustment:
         converged: of the solver.
         point_sd_mm: (N,) standard deviation of a point (all three axes together) at the given
             sigma_px and priors, as are the next two. Infinite where the data leave it open. Without
-            a shape prior they are those after the points seen twice are aligned by a similarity.
+            a shape prior, after the points observed twice are aligned by a similarity.
         rotation_sd: (K,) radians.
         focal_sd: (K,) relative.
     """
@@ -129,6 +129,8 @@ def adjust_bundle(
         focal_group: (K,) photos with the same number share their focal length.
         marginal: with a shape prior, find the cameras of highest probability with the points
             integrated out, not with the most probable points (bundle.marginal_likelihood).
+        max_iterations: of the Levenberg-Marquardt solver.
+        tolerance: relative fall of the cost at which it has converged.
 
     Raises:
         InputError: shapes, NaN, sigma not above zero.
@@ -239,9 +241,9 @@ class Posterior:
         return (residuals**2).sum(axis=1) / self.problem.observations.sigma_px**2
 
     def _log_determinants(self, state: BundleState) -> tuple[float, Float[Array, "k 7"]]:
-        """What the integral adds to the cost, and its gradient: functions of the cameras alone,
+        """What the integral adds to the cost, and its gradient.
 
-        since the points are taken at the prior's mean.
+        Functions of the cameras alone, since the points are taken at the prior's mean.
         """
         if self.integrated_sd is None:
             return 0.0, np.zeros((len(state.R), CAMERA_SIZE))

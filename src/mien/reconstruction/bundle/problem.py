@@ -243,7 +243,7 @@ class BundleProblem:
         self.basis = np.ascontiguousarray(components.reshape(len(components), 3 * count).T)
 
     def project(self, state: BundleState, points: Float[Array, "n 3"]) -> Projection:
-        """The observed points, if they lay at these places, by the state's cameras.
+        """The observed points, at these positions, by the state's cameras.
 
         Raises:
             EstimationError: a point lies behind its camera.
@@ -272,7 +272,9 @@ class BundleProblem:
     def camera_equations(
         self, state: BundleState, at: Reprojection, left: Float[Array, "m 2 7"]
     ) -> tuple[Float[Array, "d d"], Float[Array, "n d 3"], Float[Array, " d"]]:
-        """sum z'w (a y + b x) + S y = -sum z'wr - S s, with prior precision S and deviation s.
+        """The camera equations.
+
+        sum z'w (a y + b x) + S y = -sum z'wr - S s, with prior precision S and deviation s.
 
         Args:
             state: at which they are linearized.
@@ -304,7 +306,7 @@ class BundleProblem:
         common[:size, :size] = own
         common[size:, size:] = self._coefficient_information
         by_coefficients = state.coefficients - points.prior_gradient.ravel() @ self.basis
-        # In memory by point, axis and unknown: as BlockSystem wants it.
+        # In memory by point, axis and unknown: as BlockSystem reads it.
         joined = np.concatenate([np.swapaxes(coupling, 1, 2), -self._weighted_basis], axis=2)
         return BlockSystem(
             common,

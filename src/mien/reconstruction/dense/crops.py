@@ -38,9 +38,9 @@ class Crop:
     corner: Float[Array, " 2"]
     raster: Raster
 
-    def to_photo(self, places: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
+    def to_photo(self, points: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
         """Px of this image to px of the photo."""
-        return places / self.scale + self.corner
+        return points / self.scale + self.corner
 
 
 def visible_mesh(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Mesh:

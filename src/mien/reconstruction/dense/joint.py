@@ -228,9 +228,10 @@ def _camera_equations(
 def _split(
     information: Float[Array, "d d"], motions: GaugeMotions
 ) -> tuple[Float[Array, "e d"], Float[Array, "f 7"]]:
-    """Directions of the cameras' unknowns that change the images otherwise than gauge motions do,
+    """The cameras' unknowns split into gauge motions and other directions.
 
-    and combinations of the gauge motions that move cameras.
+    Directions that change the images otherwise than gauge motions do, and combinations of the gauge
+    motions that move cameras.
 
     A longer lens farther away is one of the former, though the depth alone is nearly the gauge's
     scale. One photo's camera does not move when the head grows away from it.
@@ -250,7 +251,7 @@ def _split(
 def _gauge_equations(
     problem: BundleProblem, state: BundleState, motions: GaugeMotions
 ) -> _Equations:
-    """No gauge motion brings the unknowns nearer to their priors' means:
+    """No gauge motion brings the unknowns nearer to their priors' means.
 
     sum P (d + x - B c) along each motion, and the same of the cameras, is 0.
     """

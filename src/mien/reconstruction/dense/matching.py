@@ -15,11 +15,11 @@ from mien.reconstruction.dense.crops import Crop
 
 KEPT_DETAIL_MM = 10.0
 """Patterns larger than this are taken for shading and removed before matching."""
-LEAST_FACING = 0.25
+MIN_FACING = 0.25
 """Cosine between the surface's normal and the direction to the camera."""
 ROUND_TRIP_PX = 1.0
 """From a to b and back: a match that returns farther off is wrong."""
-LEAST_CORRELATION = 0.6
+MIN_CORRELATION = 0.6
 _BEHIND_PX, _BEHIND_MM = 4.0, 3.0
 """A point this far behind the depth map of another view is hidden there."""
 _FEW = 100
@@ -33,7 +33,7 @@ _ALL = 0.99
 
 
 @dataclass(frozen=True)
-class Sight:
+class SurfaceCrop:
     """A crop with the surface behind its pixels.
 
     Attributes:
@@ -48,14 +48,15 @@ class Sight:
     usable: Bool[Array, "h w"]
 
     @classmethod
-    def of(cls, crop: Crop, mesh: Mesh, normals: Float[Array, "v 3"]) -> Sight:
+    def of(cls, crop: Crop, mesh: Mesh, normals: Float[Array, "v 3"]) -> SurfaceCrop:
+        """The surface of a mesh as the crop's camera sees it."""
         both = np.concatenate([mesh.vertices, normals], axis=1)
         at = interpolate(crop.raster, mesh.triangles, both)
         points, normal = np.ascontiguousarray(at[..., :3]), at[..., 3:]
         towards = crop.camera.center.astype(np.float32) - points
         lengths = np.sqrt(_dot(towards, towards) * _dot(normal, normal))
         facing = _dot(towards, normal) / np.maximum(lengths, 1e-9)
-        return cls(crop, points, facing, crop.raster.mask & (facing > LEAST_FACING))
+        return cls(crop, points, facing, crop.raster.mask & (facing > MIN_FACING))
 
 
 @dataclass(frozen=True)
@@ -63,19 +64,19 @@ class Match:
     """Where the pixels of crop a lie in crop b.
 
     Attributes:
-        places: (H, W, 2) px of crop b.
-        good: (H, W) seen in both and alike.
+        points: (H, W, 2) px of crop b.
+        valid: (H, W) seen in both and alike.
     """
 
-    places: Float[Array, "h w 2"]
-    good: Bool[Array, "h w"]
+    points: Float[Array, "h w 2"]
+    valid: Bool[Array, "h w"]
 
 
-Checked = tuple[Match, Float[Array, "h w"]]
+CheckedMatch = tuple[Match, Float[Array, "h w"]]
 """A match and by how many px the way back misses."""
 
 
-def match_sights(a: Sight, b: Sight, *, fine: bool = False) -> Match | None:
+def match_crops(a: SurfaceCrop, b: SurfaceCrop, *, fine: bool = False) -> Match | None:
     """Where b shows what each pixel of a shows; None where they share next to nothing.
 
     Photo b is drawn through the surface as a's camera would see it, which takes out pose and
@@ -92,42 +93,46 @@ def match_sights(a: Sight, b: Sight, *, fine: bool = False) -> Match | None:
     ours = normalize_contrast(a.crop.grey[window], mask, radius)
     theirs = normalize_contrast(_sample(b.crop.grey, there, cv2.INTER_CUBIC), mask, radius)
     moved = optical_flow(ours, theirs, fine=fine) + _centres(mask)
-    alike = local_correlation(ours, _sample(theirs, moved)) > LEAST_CORRELATION
+    alike = local_correlation(ours, _sample(theirs, moved)) > MIN_CORRELATION
     within = _sample(mask.astype(np.float32), moved) > _ALL
     inside = cv2.erode(mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    places, good = np.zeros_like(predicted), np.zeros_like(shared)
-    places[window], good[window] = _sample(there, moved), alike & within & inside
-    return Match(places, good)
+    points, valid = np.zeros_like(predicted), np.zeros_like(shared)
+    points[window], valid[window] = _sample(there, moved), alike & within & inside
+    return Match(points, valid)
 
 
-def match_both(a: Sight, b: Sight, *, fine: bool = False) -> tuple[Checked, Checked] | None:
-    """a's pixels in b and b's in a, checked by each other; None where they share nothing.
+def match_both(
+    a: SurfaceCrop, b: SurfaceCrop, *, fine: bool = False
+) -> tuple[CheckedMatch, CheckedMatch] | None:
+    """Pixels of a in b and of b in a, checked by each other; None where they share nothing.
 
     Args:
+        a: one photo.
+        b: the other.
         fine: as in optical_flow.
     """
     there, back = run_concurrently(
-        lambda: match_sights(a, b, fine=fine), lambda: match_sights(b, a, fine=fine)
+        lambda: match_crops(a, b, fine=fine), lambda: match_crops(b, a, fine=fine)
     )
     if there is None or back is None:
         return None
     return check_match(there, back), check_match(back, there)
 
 
-def check_match(there: Match, back: Match) -> Checked:
-    """The match and by how many px of a the way back misses; what misses too far is no good."""
-    off = _sample(back.places, there.places) - _centres(there.good)
+def check_match(there: Match, back: Match) -> CheckedMatch:
+    """The match and by how many px of a the way back misses; what misses too far is invalid."""
+    off = _sample(back.points, there.points) - _centres(there.valid)
     miss = np.hypot(off[..., 0], off[..., 1])
-    good = there.good & (_sample(back.good.astype(np.float32), there.places) > _ALL)
-    return Match(there.places, good & (miss < ROUND_TRIP_PX)), miss
+    valid = there.valid & (_sample(back.valid.astype(np.float32), there.points) > _ALL)
+    return Match(there.points, valid & (miss < ROUND_TRIP_PX)), miss
 
 
-def _predict(a: Sight, b: Sight) -> tuple[Float[Array, "h w 2"], Bool[Array, "h w"]]:
+def _predict(a: SurfaceCrop, b: SurfaceCrop) -> tuple[Float[Array, "h w 2"], Bool[Array, "h w"]]:
     """Where b sees the surface behind a's pixels, and which of them both see."""
     import cv2
 
     camera = b.crop.camera
-    # Single precision is good to 1e-4 px.
+    # Single precision is valid to 1e-4 px.
     in_camera = cv2.transform(a.points, np.column_stack([camera.R_cam_head, camera.t_cam_head]))
     depth = np.maximum(in_camera[..., 2], 1.0)
     scale = np.float32(camera.focal_px) / depth
@@ -138,7 +143,7 @@ def _predict(a: Sight, b: Sight) -> tuple[Float[Array, "h w 2"], Bool[Array, "h 
     slack = max(_BEHIND_MM, _BEHIND_PX * float(camera.t_cam_head[2]) / camera.focal_px)
     within = (x > _EDGE_PX) & (x < camera.width - _EDGE_PX)
     within &= (y > _EDGE_PX) & (y < camera.height - _EDGE_PX)
-    shared: Array = a.usable & within & (depth < nearest + slack) & (facing > LEAST_FACING)
+    shared: Array = a.usable & within & (depth < nearest + slack) & (facing > MIN_FACING)
     return predicted, shared
 
 
@@ -164,14 +169,14 @@ def _dot(a: Float[Array, "h w 3"], b: Float[Array, "h w 3"]) -> Float[Array, "h 
 
 
 def _sample(
-    values: Float[Array, "h w ..."], places: Float[Array, "h w 2"], how: int = 1
+    values: Float[Array, "h w ..."], points: Float[Array, "h w 2"], how: int = 1
 ) -> Float[Array, "h w ..."]:
-    """Values at places in px, 0 outside of the image; `how` is one of OpenCV's interpolations."""
+    """Values at points in px, 0 outside of the image; `how` is one of OpenCV's interpolations."""
     import cv2
 
     return cv2.remap(
         np.asarray(values, np.float32),
-        places.astype(np.float32) - np.float32(0.5),
+        points.astype(np.float32) - np.float32(0.5),
         None,
         how,
         borderMode=cv2.BORDER_CONSTANT,

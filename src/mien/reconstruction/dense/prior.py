@@ -99,9 +99,9 @@ def _spatial_modes(generic: GenericHead, sign: int) -> Float[Array, "m v"]:
     mirror = np.array([-1.0, 1.0, 1.0])
     centres = vertices[_spread_vertices(generic)]
 
-    def kernel(places: Array) -> Array:
+    def kernel(points: Array) -> Array:
         def value(to: Array) -> Array:
-            squared = (places**2).sum(1)[:, None] + (to**2).sum(1) - 2 * places @ to.T
+            squared = (points**2).sum(1)[:, None] + (to**2).sum(1) - 2 * points @ to.T
             return np.exp(-np.maximum(squared, 0) / (2 * LENGTH_MM**2))
 
         return (value(centres) + sign * value(centres * mirror)) / 2

@@ -16,40 +16,44 @@ from mien.numeric.rotation import angle_between
 from mien.progress import StepProgress, no_step_progress
 from mien.reconstruction.bundle.problem import FocalGroups, Observations, PointPrior
 from mien.reconstruction.dense.crops import finest_mm_per_px, visible_mesh
-from mien.reconstruction.dense.eyes import seat_eyes
+from mien.reconstruction.dense.eyeballs import fit_eyeballs
 from mien.reconstruction.dense.joint import JointSolution, solve_jointly
 from mien.reconstruction.dense.prior import HeadPrior, load_head_prior
-from mien.reconstruction.dense.quality import FEW_PLACES, Quality, judge_registration
+from mien.reconstruction.dense.quality import (
+    MIN_SHARED_POINTS,
+    RegistrationQuality,
+    assess_registration,
+)
 from mien.reconstruction.dense.surface import NO_OFFSETS, Offsets, measure_offsets, move_surface
-from mien.reconstruction.dense.surface_tracks import NO_TRACKS, Tracks, find_tracks
+from mien.reconstruction.dense.tracks import NO_TRACKS, Tracks, find_tracks
 from mien.reconstruction.dense.uncertainty import vertex_deviation
 from mien.reconstruction.features import Features
 from mien.reconstruction.shape.deformation import deform_head
-from mien.reconstruction.triangulation import intersect_rays
+from mien.reconstruction.triangulation import triangulate
 
 SCALES_MM = (2.0, 1.2, 0.8, 0.5)
 """What a pixel shows, from round to round."""
 FINEST_MM = 0.4
 """The same for the last look, at the surface alone."""
-PLACES, FINE_PLACES = 1800, 20_000
+POINTS, FINE_POINTS = 1800, 20_000
 """Places followed in a round, and in the last look."""
 ALONG_SD_MM, ACROSS_SD_MM = 10.0, 1.0
-"""How far a place of the surface lies off the prior, along the surface (where the mesh may have
+"""How far a point of the surface lies off the prior, along the surface (where the mesh may have
 slid) and across it."""
 HAIR_SD_MM = 10.0
 """Across the surface where hair covers it."""
-INDEPENDENT_PLACES = 150
-"""What the prior does not express goes together over 15 to 20 mm of skin: however many places are
+INDEPENDENT_POINTS = 150
+"""What the prior does not express goes together over 15 to 20 mm of skin: however many points are
 followed on a face, they tell no more of the prior's coefficients than so many."""
 ATTACHED_SD_MM, NAMED_SD_MM = 1.5, 6.0
-"""How far a landmark's place lies off its attachment on the prior, and a hand-made mark's off the
+"""How far a landmark's point lies off its attachment on the prior, and a hand-made mark's off the
 vertex of its name: people differ in what they mean by one, and marks count in the end, not here."""
-LANDMARK_SHARE = 4.0
+LANDMARK_SIGMA_FACTOR = 4.0
 """Landmarks err together, not each by itself: so many times their sigma."""
-SETTLED_RAD = np.deg2rad(1.0)
+CONVERGED_RAD = np.deg2rad(1.0)
 COARSE_ROUNDS = 4
-ENOUGH_PLACES = 150
-"""Fewer places shared by all photos together tell nothing."""
+MIN_TRACKED_POINTS = 150
+"""Fewer points shared by all photos together tell nothing."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,7 @@ class Registration:
     cameras: tuple[Camera, ...]
     vertices: Float[Array, "v 3"]
     deviation_mm: Float[Array, " v"]
-    quality: Quality
+    quality: RegistrationQuality
 
 
 def register_views(
@@ -83,44 +87,48 @@ def register_views(
     """Cameras and shape from all the skin that the photos share, from coarse to fine.
 
     Args:
+        views: K photos.
         cameras: from landmarks, within some 15 degrees.
         vertices: from landmarks, within some 15 degrees.
-        features: landmarks and marks of the same photos. Landmarks tell what place of the mesh is
+        features: landmarks and marks of the same photos. Landmarks tell what point of the mesh is
             which, and lead the camera of a photo that shares too little with the others; marks lead
             all cameras, and the head passes through them in the end.
+        focal: which photos share a focal length, and their priors.
+        generic: the generic head.
         scales: mm a px, from round to round.
+        progress: called with steps done and their total.
 
     Returns:
         None where the photos share too little that looks alike.
     """
-    tell = progress or no_step_progress
+    progress = progress or no_step_progress
     prior = load_head_prior()
     problem = _Problem(views, features, focal, generic, prior, _rotations(cameras))
     state = _State(tuple(cameras), vertices)
     scales = _useful(scales, cameras)
     for step, scale in enumerate(scales):
-        tell(step, len(scales) + 1)
+        progress(step, len(scales) + 1)
         for _ in range(COARSE_ROUNDS if step == 0 else 1):
-            before, tracks = state.cameras, problem.tracks(state, scale, PLACES)
-            if len(tracks.corners) < ENOUGH_PLACES:
+            before, tracks = state.cameras, problem.tracks(state, scale, POINTS)
+            if len(tracks.corners) < MIN_TRACKED_POINTS:
                 return None
             state, solution = problem.round(state, tracks)
-            if _largest_turn(before, state.cameras) < SETTLED_RAD:
+            if _largest_turn(before, state.cameras) < CONVERGED_RAD:
                 break
-    tell(len(scales), len(scales) + 1)
-    finest = problem.tracks(state, max(FINEST_MM, finest_mm_per_px(state.cameras)), FINE_PLACES)
+    progress(len(scales), len(scales) + 1)
+    finest = problem.tracks(state, max(FINEST_MM, finest_mm_per_px(state.cameras)), FINE_POINTS)
     vertices, offsets = problem.moved(state.vertices, finest, state.cameras)
-    vertices = seat_eyes(_on_marks(vertices, features, state.cameras, generic), generic)
+    vertices = fit_eyeballs(_on_marks(vertices, features, state.cameras, generic), generic)
     count = len(solution.state.coefficients)
     deviation = vertex_deviation(
         solution.covariance[-count:, -count:], prior, finest, offsets, generic
     )
-    tell(len(scales) + 1, len(scales) + 1)
-    quality = judge_registration(tracks, solution, generic)
+    progress(len(scales) + 1, len(scales) + 1)
+    quality = assess_registration(tracks, solution, generic)
     return Registration(state.cameras, vertices, deviation, quality)
 
 
-def deviation_by_features(
+def deviation_from_features(
     views: Sequence[CapturedView],
     cameras: Sequence[Camera],
     vertices: Float[Array, "v 3"],
@@ -161,10 +169,10 @@ class _Problem:
         vertices, _ = self.moved(vertices, tracks, solution.cameras)
         return _State(solution.cameras, vertices), solution
 
-    def tracks(self, state: _State, scale: float, places: int) -> Tracks:
+    def tracks(self, state: _State, scale: float, points: int) -> Tracks:
         """Places of the surface that several photos show."""
         mesh = visible_mesh(self.generic, state.vertices)
-        return find_tracks(self.views, state.cameras, mesh, mm_per_px=scale, places=places)
+        return find_tracks(self.views, state.cameras, mesh, mm_per_px=scale, points=points)
 
     def moved(
         self, vertices: Float[Array, "v 3"], tracks: Tracks, cameras: Sequence[Camera]
@@ -174,23 +182,23 @@ class _Problem:
         return move_surface(vertices, tracks, offsets, self.generic), offsets
 
     def solve(self, state: _State, tracks: Tracks) -> JointSolution:
-        """Tracks and features together: places on the mesh, what photos show of them, beliefs."""
+        """Tracks and features together: points on the mesh, what photos show of them, prior."""
         features, prior = self.features, self.prior
-        photo, feature = np.nonzero(features.seen)
+        photo, feature = np.nonzero(features.observed)
         by_hand = features.by_hand[photo, feature]
         sigma = features.sigma_px(state.cameras)[photo, feature]
         # Landmarks lead a camera only where nothing better does.
-        alone = np.bincount(tracks.photo, minlength=len(self.views)) < FEW_PLACES
+        alone = np.bincount(tracks.photo, minlength=len(self.views)) < MIN_SHARED_POINTS
         leading = by_hand | alone[photo]
-        sigma = np.where(leading, sigma, LANDMARK_SHARE * sigma)
-        crowding = np.sqrt(tracks.crowding)[tracks.place]
-        sightings = Observations(
+        sigma = np.where(leading, sigma, LANDMARK_SIGMA_FACTOR * sigma)
+        overlap = np.sqrt(tracks.overlap)[tracks.point]
+        observations = Observations(
             photo=np.append(tracks.photo, photo),
-            point=np.append(tracks.place, feature + len(tracks.corners)),
+            point=np.append(tracks.point, feature + len(tracks.corners)),
             image_points=np.concatenate(
                 [tracks.image_points, features.image_points[photo, feature]]
             ),
-            sigma_px=np.append(tracks.sigma_px * crowding, sigma),
+            sigma_px=np.append(tracks.sigma_px * overlap, sigma),
             for_cameras=np.append(np.ones(len(tracks.photo), bool), leading),
         )
 
@@ -200,7 +208,7 @@ class _Problem:
         attached_sd = np.where(features.by_hand.any(axis=0), NAMED_SD_MM, ATTACHED_SD_MM)
         attached = np.eye(3) / attached_sd[:, None, None] ** 2
         mesh = self.generic.mesh.with_vertices(state.vertices)
-        beliefs = PointPrior(
+        point_prior = PointPrior(
             on(prior.mean),
             on(prior.components),
             np.concatenate([_skin_precision(tracks, mesh, self.generic), attached]),
@@ -208,8 +216,8 @@ class _Problem:
         return solve_jointly(
             state.cameras,
             on(state.vertices),
-            sightings,
-            beliefs,
+            observations,
+            point_prior,
             self.focal,
             prior_rotations=self.prior_rotations,
         )
@@ -226,10 +234,10 @@ def _on_marks(
     if not marked.any():
         return vertices
     image = np.where(features.by_hand[..., None], features.image_points, np.nan)[:, marked]
-    places = features.on(vertices)[marked]
-    goals = intersect_rays(cameras, image, current=places).points
+    points = features.on(vertices)[marked]
+    goals = triangulate(cameras, image, current=points).points
     deviation = np.where(features.by_hand, features.sigma_mm, np.inf).min(axis=0)[marked]
-    return deform_head(vertices, places, goals, generic, deviation_mm=deviation)
+    return deform_head(vertices, points, goals, generic, deviation_mm=deviation)
 
 
 def _rotations(cameras: Sequence[Camera]) -> Float[Array, "k 3 3"]:
@@ -247,12 +255,12 @@ def _useful(scales: Sequence[float], cameras: Sequence[Camera]) -> list[float]:
 
 
 def _skin_precision(tracks: Tracks, mesh: Mesh, generic: GenericHead) -> Float[Array, "n 3 3"]:
-    """(N, 3, 3) 1 / mm^2: how near the surface's places lie to the prior, by direction."""
+    """(N, 3, 3) 1 / mm^2: how near the surface's points lie to the prior, by direction."""
     normals = tracks.on(mesh.vertex_normals())
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     across = normals[:, :, None] * normals[:, None, :]
     hair = tracks.on(generic.regions["scalp"][:, None])[:, 0]
     across_sd = ACROSS_SD_MM + hair * (HAIR_SD_MM - ACROSS_SD_MM)
     along: Array = (np.eye(3) - across) / ALONG_SD_MM**2
-    share = min(1.0, INDEPENDENT_PLACES / max(len(normals), 1))
+    share = min(1.0, INDEPENDENT_POINTS / max(len(normals), 1))
     return share * (along + across / across_sd[:, None, None] ** 2)

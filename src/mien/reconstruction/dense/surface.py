@@ -16,27 +16,27 @@ from mien.mesh import Mesh
 from mien.numeric.segment_sum import SegmentSum
 from mien.reconstruction.bundle.projection import PinholeArrays, project_points
 from mien.reconstruction.dense.joint import noise_factor
-from mien.reconstruction.dense.surface_tracks import Tracks
+from mien.reconstruction.dense.tracks import Tracks
 from mien.reconstruction.shape.deformation import with_round_eyes
 
 BENDING = 3.0
 """How stiff the surface is: weight (mm^2) of its squared mean bending against squared offsets over
 their variance."""
-LEAST_SD_MM = 0.05
-"""No place is known better than this, however many photos agree."""
+MIN_SD_MM = 0.05
+"""No point is known better than this, however many photos agree."""
 _WRONG_SDS = 1.5
 _ROUNDS = 4
 _REACH_MM = 30.0
-_STRAIGHTENED_MM, _LEAST_STRAIGHT = 6.0, 0.3
+_STRAIGHTENED_MM, _MIN_STRAIGHTNESS = 6.0, 0.3
 """How far around normals are averaged into directions of movement, and the least cosine between the
 two that counts."""
 _FAR_MM = 10.0
-"""A place may lie this far off the surface along the rays."""
+"""A point may lie this far off the surface along the rays."""
 
 
 @dataclass(frozen=True)
 class Offsets:
-    """How far the photos put N places off the surface.
+    """How far the photos put N points off the surface.
 
     Attributes:
         along_normal: (N,) mm.
@@ -57,25 +57,25 @@ def measure_offsets(
     start = tracks.on(mesh.vertices)
     normals = tracks.on(mesh.vertex_normals())
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    pinholes, by_place = PinholeArrays.of(cameras), SegmentSum(tracks.place, len(start))
+    pinholes, by_place = PinholeArrays.of(cameras), SegmentSum(tracks.point, len(start))
     principal = np.stack([camera.principal for camera in cameras])
     image = tracks.image_points - principal[tracks.photo]
     weak = np.eye(3) / _FAR_MM**2
-    places = start
+    points = start
     for _ in range(rounds):
-        seen = project_points(pinholes, tracks.photo, places[tracks.place])
+        seen = project_points(pinholes, tracks.photo, points[tracks.point])
         residuals = seen.image_points - image
         squared = (residuals**2).sum(axis=1) / tracks.sigma_px**2
         weights = 1 / (tracks.sigma_px**2 * (1 + squared / 4))
         weighted = np.swapaxes(weights[:, None, None] * seen.point_jacobian, 1, 2)
         covariance = np.linalg.inv(weak + by_place(weighted @ seen.point_jacobian))
-        gradient = by_place((weighted @ residuals[..., None])[..., 0]) + (places - start) @ weak
-        places = places - (covariance @ gradient[..., None])[..., 0]
-    offsets: Array = ((places - start) * normals).sum(axis=1)
+        gradient = by_place((weighted @ residuals[..., None])[..., 0]) + (points - start) @ weak
+        points = points - (covariance @ gradient[..., None])[..., 0]
+    offsets: Array = ((points - start) * normals).sum(axis=1)
     sd = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariance, normals))
     # Places that share a patch of the matching share its error.
-    sd *= noise_factor(np.sqrt(squared)) * np.sqrt(tracks.crowding)
-    return Offsets(offsets, np.maximum(sd, LEAST_SD_MM))
+    sd *= noise_factor(np.sqrt(squared)) * np.sqrt(tracks.overlap)
+    return Offsets(offsets, np.maximum(sd, MIN_SD_MM))
 
 
 def move_surface(
@@ -136,7 +136,7 @@ def _solve_heights(
     # Offsets are along the normals, heights along smoother directions.
     normals = mesh.vertex_normals()
     straightness = (tracks.on(normals) * tracks.on(directions)).sum(axis=1)
-    spread = diags_array(np.maximum(straightness, _LEAST_STRAIGHT)) @ spread
+    spread = diags_array(np.maximum(straightness, _MIN_STRAIGHTNESS)) @ spread
     heights, left = np.zeros(spread.shape[1]), offsets.along_normal
     for _ in range(_ROUNDS):
         weights = used / (offsets.sd**2 * (1 + (left / (_WRONG_SDS * offsets.sd)) ** 2))
@@ -186,7 +186,7 @@ class _HeightProblem:
     root: Any
 
     def at(self, tracks: Tracks) -> tuple[Any, Bool[Array, " n"]]:
-        """(N, V) sparse: heights of the vertices to heights at the places; which have one."""
+        """(N, V) sparse: heights of the vertices to heights at the points; which have one."""
         from scipy.sparse import csr_array
 
         count = len(tracks.corners)

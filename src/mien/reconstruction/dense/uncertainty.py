@@ -8,13 +8,13 @@ from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.reconstruction.dense.prior import ASYMMETRIC_SD_MM, SYMMETRIC_SD_MM, HeadPrior
 from mien.reconstruction.dense.surface import Offsets, sample_heights
-from mien.reconstruction.dense.surface_tracks import Tracks
+from mien.reconstruction.dense.tracks import Tracks
 
 ACROSS_SD_MM = 1.0
 """Deviations from the smooth prior across the surface where no photo tells."""
 ALONG_SD_MM = 1.0
-"""How far a place lies along the surface from where it is taken for: nothing on plain skin tells
-which place of another face is the same."""
+"""How far a point lies along the surface from its correspondence: on plain skin nothing fixes which
+point of another face corresponds."""
 _DRAWS = 48
 
 
@@ -33,6 +33,10 @@ def vertex_deviation(
 
     Args:
         covariance: (C, C) of the prior's coefficients.
+        prior: of the shape.
+        tracks: of the last matching.
+        offsets: of the tracks from the surface.
+        generic: the generic head.
     """
     of_coefficients = _spread(covariance, prior.components)
     heights = sample_heights(tracks, offsets, generic, draws=_DRAWS)

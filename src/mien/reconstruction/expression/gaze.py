@@ -12,7 +12,7 @@ from mien.capture.faces.mediapipe_face import LEFT_IRIS, RIGHT_IRIS
 from mien.capture.source import CapturedView
 
 EYEBALLS = {"left_eyeball": LEFT_IRIS, "right_eyeball": RIGHT_IRIS}
-MOST_RAD = np.deg2rad(45.0)
+MAX_GAZE_RAD = np.deg2rad(45.0)
 """No eye turns farther."""
 
 
@@ -28,13 +28,13 @@ def iris_directions(
     irises = view.landmarks.points[list(EYEBALLS.values())]
     if not inside_picture(irises, view.photo.size).all():
         return None
-    places = generic.landmark_positions(vertices)
+    points = generic.landmark_positions(vertices)
     directions = np.empty((2, 3))
     for row, (name, iris) in enumerate(EYEBALLS.items()):
         ball = vertices[np.unique(generic.mesh.triangles[generic.mesh.triangles_of(name)])]
         centre = ball.mean(axis=0)
         # A person's eyeball is no sphere: what counts is how far from its centre the iris lies.
-        radius = float(np.linalg.norm(places[iris] - centre))
+        radius = float(np.linalg.norm(points[iris] - centre))
         point = view.landmarks.points[iris]
         directions[row] = direction_to_iris(camera, point, centre, radius)
     return directions
@@ -48,6 +48,7 @@ def direction_to_iris(
     A ray that misses the ball grazes it.
 
     Args:
+        camera: of the photo.
         image_point: (2,) px.
         centre: (3,) mm, head space.
         radius: mm.
@@ -61,7 +62,7 @@ def direction_to_iris(
     return to_iris / np.linalg.norm(to_iris)
 
 
-def yaw_pitch_of(directions: Float[Array, "n 3"]) -> Float[Array, "n 2"]:
+def yaw_pitch_from_directions(directions: Float[Array, "n 3"]) -> Float[Array, "n 2"]:
     """Radians to the subject's left, and up."""
     x, y, z = directions.T
     return np.column_stack([np.arctan2(x, z), np.arcsin(np.clip(y, -1, 1))])

@@ -15,12 +15,12 @@ from mien.reconstruction.features import EDGE_SIGMA_MM, Features, gather_feature
 from mien.reconstruction.observations import SurfaceObservations
 
 EXPRESSED_EDGE_MM = 0.8
-"""How far a landmark on an edge lies off its place on this person's head, once that is known."""
+"""Standard deviation of a landmark on an edge from its known point on this person's head."""
 EXPRESSED_SKIN_MM = 2.5
-"""The same for one on plain skin, which the detector guesses from the edges."""
-_HALF_BELIEVED = 1.25
-"""Confidence, summed over neutral photos, at which half of what they say of a landmark's place is
-believed: one says little, for landmarks slide from view to view."""
+"""The same for one on plain skin, which the detector interpolates from the edges."""
+_SHRINKAGE = 1.25
+"""Confidence, summed over neutral photos, at which half of a landmark's mean offset is used:
+one photo is weak evidence, for landmarks slide from view to view."""
 
 
 @dataclass(frozen=True)
@@ -42,15 +42,14 @@ class KnownHead:
 
 
 def feature_observations(features: Features, known: KnownHead) -> SurfaceObservations:
-    """Landmarks and marks of an expression's photos, corrected by what the neutral ones say.
+    """Landmarks and marks of an expression's photos, less their offsets in the neutral ones.
 
-    A detector means by a landmark a place that differs from person to person, but hardly between a
-    person's expressions: where the neutral photos show it off its attachment, it is there in the
-    others, too.
+    A landmark lies at a point that differs from person to person, but hardly between a person's
+    expressions: where the neutral photos show it off its attachment, the others do, too.
     """
     # Irises lie on the eyeballs, which turn by themselves.
     on_face = known.generic.regions["face"][features.corners].max(axis=1) > 0
-    photo, column = np.nonzero(features.seen & (on_face | features.by_hand))
+    photo, column = np.nonzero(features.observed & (on_face | features.by_hand))
     offset = _offset(features, known)
     landmark = ~features.by_hand[photo, column]
     on_edge = features.sigma_mm[photo, column] <= 2 * EDGE_SIGMA_MM
@@ -70,16 +69,16 @@ def _offset(features: Features, known: KnownHead) -> Float[Array, "n 3"]:
     seen = gather_features(known.views, known.generic)
     column_name = {name: column for column, name in enumerate(seen.names)}
     total, weight = np.zeros((len(seen.names), 3)), np.zeros(len(seen.names))
-    places = seen.on(known.vertices)
+    points = seen.on(known.vertices)
     for k, camera in enumerate(known.cameras):
-        off = seen.image_points[k] - camera.project(places)
-        mm_per_px = camera.to_camera(places)[:, 2] / camera.focal_px
-        usable = seen.seen[k] & ~seen.by_hand[k]
+        off = seen.image_points[k] - camera.project(points)
+        mm_per_px = camera.to_camera(points)[:, 2] / camera.focal_px
+        usable = seen.observed[k] & ~seen.by_hand[k]
         confidence = np.where(usable, EDGE_SIGMA_MM / seen.sigma_mm[k], 0.0)
         moved = (off * mm_per_px[:, None]) @ camera.R_cam_head[:2]
         total[usable] += (confidence[:, None] * moved)[usable]
         weight += confidence
-    mean = total / (weight + _HALF_BELIEVED)[:, None]
+    mean = total / (weight + _SHRINKAGE)[:, None]
     offset = np.zeros((len(features.names), 3))
     for n, name in enumerate(features.names):
         if name in column_name:

@@ -14,18 +14,18 @@ from mien.mesh import Mesh
 from mien.numeric.raster.rasterizer import interpolate
 from mien.numeric.rotation import angle_between
 from mien.reconstruction.dense.crops import crop_view, finest_mm_per_px, visible_mesh
-from mien.reconstruction.dense.matching import Sight, match_both
+from mien.reconstruction.dense.matching import SurfaceCrop, match_both
 from mien.reconstruction.expression.known_head import KnownHead
 from mien.reconstruction.observations import SurfaceObservations
 
 MATCHED_SIGMA_MM = 0.4
-"""Error of skin found again: wrinkles and light change what it looks like."""
-_PLACES = 1500
-_PATCH_PX, _LEAST_STEP_PX = 8, 2
-"""Side of what is matched at once, and how near to each other two places are followed at most."""
+"""Standard deviation of matched skin, whose look changes with wrinkles and light."""
+_POINTS = 1500
+_PATCH_PX, _MIN_STEP_PX = 8, 2
+"""Side of what is matched at once, and how near to each other two points are followed at most."""
 
 
-def follow_skin(
+def track_skin(
     view: CapturedView,
     camera: Camera,
     vertices: Float[Array, "v 3"],
@@ -37,51 +37,55 @@ def follow_skin(
     """Places of the neutral head's skin where the expression's photo shows them.
 
     The neutral photo that looks from the nearest side is drawn as the expression's camera would
-    see it, each place of the skin moved to where the expression has it so far; dense matching then
+    see it, each point of the skin moved to where the expression has it so far; dense matching then
     measures what is left.
 
     Args:
+        view: a photo of the expression.
+        camera: of the photo.
         vertices: (V, 3) mm, the expression as known so far.
+        known: the neutral head.
         photo: number of the view among the expression's photos.
+        mm_per_px: scale at which to match.
 
     Returns:
-        None where too little looks alike.
+        None where too little matches.
     """
     nearest = _nearest(camera, known)
     still = visible_mesh(known.generic, known.vertices)
     moved = visible_mesh(known.generic, vertices)
     scale = max(mm_per_px, finest_mm_per_px([camera, known.cameras[nearest]]))
-    here = _sight(view, camera, moved, still, scale)
-    there = _sight(known.views[nearest], known.cameras[nearest], still, moved, scale)
+    here = _surface_crop(view, camera, moved, still, scale)
+    there = _surface_crop(known.views[nearest], known.cameras[nearest], still, moved, scale)
     if here is None or there is None:
         return None
     matches = match_both(there, here)
     if matches is None:
         return None
     match, _ = matches[0]
-    rows, columns, step = _grid(match.good)
+    rows, columns, step = _grid(match.valid)
     if not len(rows):
         return None
     raster = there.crop.raster
     corners = still.triangles[raster.triangle_ids[rows, columns]]
-    steady = _steady(known.generic)[corners].all(axis=1)
+    steady = _rigid_skin(known.generic)[corners].all(axis=1)
     rows, columns, corners = rows[steady], columns[steady], corners[steady]
     return SurfaceObservations(
         corners=corners,
         barycentrics=raster.barycentrics[rows, columns].astype(np.float64),
         offset=np.zeros((len(rows), 3)),
         photo=np.full(len(rows), photo),
-        image_points=here.crop.to_photo(match.places[rows, columns]),
+        image_points=here.crop.to_photo(match.points[rows, columns]),
         # Places that share a patch of the matching share its error.
         sigma_mm=np.full(len(rows), MATCHED_SIGMA_MM * max(1.0, _PATCH_PX / step)),
     )
 
 
-def _steady(generic: GenericHead) -> Bool[Array, " v"]:
+def _rigid_skin(generic: GenericHead) -> Bool[Array, " v"]:
     """(V,) skin that goes with the head: the neck turns by itself, hair has no surface."""
     regions = generic.regions
-    apart = regions["neck"] + regions["scalp"] + regions["left_ear"] + regions["right_ear"]
-    return (regions["face"] > 0) & (apart < 0.5) & (regions["eye_socket"] < 1)
+    excluded = regions["neck"] + regions["scalp"] + regions["left_ear"] + regions["right_ear"]
+    return (regions["face"] > 0) & (excluded < 0.5) & (regions["eye_socket"] < 1)
 
 
 def _nearest(camera: Camera, known: KnownHead) -> int:
@@ -93,19 +97,19 @@ def _nearest(camera: Camera, known: KnownHead) -> int:
     return int(np.argmin(turned))
 
 
-def _sight(
+def _surface_crop(
     view: CapturedView, camera: Camera, mesh: Mesh, other: Mesh, scale: float
-) -> Sight | None:
+) -> SurfaceCrop | None:
     """The photo's view of a mesh, its points where the other mesh has them."""
     crop = crop_view(view, camera, mesh, scale)
     if crop is None:
         return None
-    sight = Sight.of(crop, mesh, mesh.vertex_normals())
-    return replace(sight, points=interpolate(crop.raster, mesh.triangles, other.vertices))
+    surface_crop = SurfaceCrop.of(crop, mesh, mesh.vertex_normals())
+    return replace(surface_crop, points=interpolate(crop.raster, mesh.triangles, other.vertices))
 
 
-def _grid(good: Bool[Array, "h w"]) -> tuple[Int[Array, " n"], Int[Array, " n"], int]:
-    """Rows and columns of evenly spread pixels that are good, and how many px they are apart."""
-    step = max(_LEAST_STEP_PX, int(np.sqrt(np.count_nonzero(good) / _PLACES)))
-    rows, columns = np.nonzero(good[step // 2 :: step, step // 2 :: step])
+def _grid(valid: Bool[Array, "h w"]) -> tuple[Int[Array, " n"], Int[Array, " n"], int]:
+    """Rows and columns of evenly spread pixels that are valid, and how many px they are apart."""
+    step = max(_MIN_STEP_PX, int(np.sqrt(np.count_nonzero(valid) / _POINTS)))
+    rows, columns = np.nonzero(valid[step // 2 :: step, step // 2 :: step])
     return rows * step + step // 2, columns * step + step // 2, step

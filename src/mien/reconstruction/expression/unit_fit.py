@@ -14,15 +14,15 @@ from mien.reconstruction.expression.known_head import KnownHead
 from mien.reconstruction.observations import SurfaceObservations, reproject
 
 UNIT_SD = 0.35
-"""How far a unit's weight lies off what the detector's scores say."""
-MOST = 1.2
+"""Standard deviation of a unit's weight from the detector's score."""
+MAX_WEIGHT = 1.2
 """A unit goes no farther than this."""
 _ROUNDS = 12
-_SETTLED = 1e-4
+_CONVERGED = 1e-4
 
 
 @dataclass(frozen=True)
-class Explained:
+class UnitFit:
     """What explains the photos of an expression.
 
     Attributes:
@@ -38,15 +38,15 @@ class Explained:
         return known.vertices + np.tensordot(self.weights, known.units, axes=1)
 
 
-def explain(
+def fit_unit_weights(
     observations: SurfaceObservations,
-    start: Explained,
+    start: UnitFit,
     expected: Float[Array, " 52"],
     focal_sd: Float[Array, " k"],
     known: KnownHead,
     *,
     free: Bool[Array, " 52"],
-) -> Explained:
+) -> UnitFit:
     """Cameras and unit weights of highest posterior.
 
     Minimizes the Cauchy-weighted squared reprojection errors, in units of their sigma, plus
@@ -54,8 +54,11 @@ def explain(
     weights stay within 0 and 1.2.
 
     Args:
-        expected: (52,) what the detector says of the units.
+        observations: of all photos.
+        start: initial values.
+        expected: (52,) units by the detector's scores.
         focal_sd: (K,) standard deviation of log focal lengths.
+        known: the neutral head.
         free: (52,) the units to solve for; the others stay at 0.
     """
     from scipy.optimize import lsq_linear
@@ -68,36 +71,36 @@ def explain(
     for _ in range(_ROUNDS):
         matrix, gradient = _normal_equations(observations, state, rest, basis, units)
         count = len(state.cameras)
-        lens = CAMERA_SIZE * np.arange(count) + CAMERA_SIZE - 1
+        focal_rows = CAMERA_SIZE * np.arange(count) + CAMERA_SIZE - 1
         now = np.log([camera.focal_px for camera in state.cameras])
-        matrix[lens, lens] += 1 / focal_sd**2
-        gradient[lens] += (now - focal) / focal_sd**2
+        matrix[focal_rows, focal_rows] += 1 / focal_sd**2
+        gradient[focal_rows] += (now - focal) / focal_sd**2
         own = CAMERA_SIZE * count + np.arange(len(units))
         matrix[own, own] += 1 / UNIT_SD**2
         gradient[own] += (state.weights[units] - expected[units]) / UNIT_SD**2
         matrix[np.diag_indices_from(matrix)] *= 1 + 1e-6
         root = np.linalg.cholesky(matrix).T
         low, high = np.full(len(matrix), -np.inf), np.full(len(matrix), np.inf)
-        low[own], high[own] = -state.weights[units], MOST - state.weights[units]
+        low[own], high[own] = -state.weights[units], MAX_WEIGHT - state.weights[units]
         high[own] = np.maximum(high[own], low[own] + 1e-9)
         step = lsq_linear(root, -np.linalg.solve(root.T, gradient), bounds=(low, high)).x
         state = _moved(state, step, units)
-        if np.abs(step).max() < _SETTLED:
+        if np.abs(step).max() < _CONVERGED:
             break
     return state
 
 
 def _normal_equations(
     observations: SurfaceObservations,
-    state: Explained,
+    state: UnitFit,
     rest: Float[Array, "m 3"],
     basis: Float[Array, "u m 3"],
     units: Array,
 ) -> tuple[Array, Array]:
     """J^T W J and J^T W r over all cameras' unknowns and the weights."""
     photo, count = observations.photo, len(state.cameras)
-    places = rest + np.tensordot(state.weights[units], basis, axes=1) if len(units) else rest
-    errors = reproject(observations, places, state.cameras)
+    points = rest + np.tensordot(state.weights[units], basis, axes=1) if len(units) else rest
+    errors = reproject(observations, points, state.cameras)
     jacobian = np.zeros((len(photo), 2, CAMERA_SIZE * count + len(units)))
     rows = np.arange(len(photo))[:, None]
     columns = CAMERA_SIZE * photo[:, None] + np.arange(CAMERA_SIZE)
@@ -111,7 +114,7 @@ def _normal_equations(
     return weighted.T @ flat, weighted.T @ errors.residuals.ravel()
 
 
-def _moved(state: Explained, step: Array, units: Array) -> Explained:
+def _moved(state: UnitFit, step: Array, units: Array) -> UnitFit:
     count = len(state.cameras)
     cameras = []
     for camera, move in zip(
@@ -123,5 +126,5 @@ def _moved(state: Explained, step: Array, units: Array) -> Explained:
         focal = camera.focal_px * float(np.exp(np.clip(move[6], -0.5, 0.5)))
         cameras.append(replace(camera, R_cam_head=turned, t_cam_head=moved, focal_px=focal))
     weights = state.weights.copy()
-    weights[units] = np.clip(weights[units] + step[CAMERA_SIZE * count :], 0, MOST)
-    return Explained(tuple(cameras), weights)
+    weights[units] = np.clip(weights[units] + step[CAMERA_SIZE * count :], 0, MAX_WEIGHT)
+    return UnitFit(tuple(cameras), weights)

@@ -1,5 +1,5 @@
 """Cameras of photos that the face detector cannot read, from those that it can."""
 
-from mien.reconstruction.localization.localizer import place_view, place_views
+from mien.reconstruction.localization.localizer import localize_view, localize_views
 
-__all__ = ["place_view", "place_views"]
+__all__ = ["localize_view", "localize_views"]

@@ -1,4 +1,4 @@
-"""One camera from places on a head that is known, with a belief about the focal length."""
+"""One camera from points on a known head, with a prior of the focal length."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.camera import Camera
-from mien.numeric.rotation import cross_matrix, rotation_from_vector
+from mien.numeric.rotation import rotation_from_vector
 from mien.numeric.solvers.levenberg_marquardt import minimize_lm
 from mien.numeric.solvers.robust import loss_named
+from mien.reconstruction.bundle.projection import PinholeArrays, project_points
 
 _NEAREST_MM = 150.0
 """No photo of a head is taken from nearer by."""
 
 
 @dataclass(frozen=True)
-class FocalBelief:
+class FocalLengthPrior:
     """Focal length in px and its relative deviation."""
 
     focal_px: float
@@ -27,15 +28,15 @@ class FocalBelief:
 
 def refine_camera(
     camera: Camera,
-    places: Float[Array, "n 3"],
+    points: Float[Array, "n 3"],
     image_points: Float[Array, "n 2"],
     *,
     sigma_px: float,
-    focal: FocalBelief,
+    focal: FocalLengthPrior,
     loss: str = "cauchy",
 ) -> Camera | None:
     """The camera of highest posterior near this one; None where it comes too near to the head."""
-    problem = _Problem(places, image_points, sigma_px, focal, loss)
+    problem = _Problem(points, image_points, sigma_px, focal, loss)
     found = minimize_lm(
         camera,
         cost=problem.cost,
@@ -49,25 +50,25 @@ def refine_camera(
 
 @dataclass(frozen=True)
 class _Problem:
-    places: Float[Array, "n 3"]
+    points: Float[Array, "n 3"]
     image_points: Float[Array, "n 2"]
     sigma_px: float
-    focal: FocalBelief
+    focal: FocalLengthPrior
     loss: str
 
     def cost(self, camera: Camera) -> float:
-        in_camera = camera.to_camera(self.places)
+        in_camera = camera.to_camera(self.points)
         if in_camera[:, 2].min() <= 0:
             return float("inf")
-        residuals = (camera.project(self.places) - self.image_points) / self.sigma_px
+        residuals = (camera.project(self.points) - self.image_points) / self.sigma_px
         rho = loss_named(self.loss)((residuals**2).sum(axis=1))[0]
         return 0.5 * float(rho.sum() + self._focal_off(camera) ** 2)
 
     def linearize(self, camera: Camera) -> Callable[[float], tuple[Array, float]]:
         """Gauss-Newton for a rotation vector, a shift (mm) and a change of log focal length."""
-        residuals = (camera.project(self.places) - self.image_points) / self.sigma_px
+        residuals = (camera.project(self.points) - self.image_points) / self.sigma_px
         weights = loss_named(self.loss)((residuals**2).sum(axis=1))[1]
-        jacobian = _jacobian(camera, self.places) / self.sigma_px
+        jacobian = _jacobian(camera, self.points) / self.sigma_px
         normal = np.einsum("nij,n,nik->jk", jacobian, weights, jacobian, optimize=True)
         gradient = np.einsum("nij,n,ni->j", jacobian, weights, residuals, optimize=True)
         normal[6, 6] += 1 / self.focal.deviation**2
@@ -93,13 +94,10 @@ def _moved(camera: Camera, step: Float[Array, " 7"]) -> Camera:
     )
 
 
-def _jacobian(camera: Camera, places: Float[Array, "n 3"]) -> Float[Array, "n 2 7"]:
+def _jacobian(camera: Camera, points: Float[Array, "n 3"]) -> Float[Array, "n 2 7"]:
     """Derivatives of the projection by a rotation after R, by t and by log focal length."""
-    turned = places @ camera.R_cam_head.T
-    x, y, z = (turned + camera.t_cam_head).T
-    by_place = np.zeros((len(places), 2, 3))
-    by_place[:, 0, 0] = by_place[:, 1, 1] = camera.focal_px / z
-    by_place[:, 0, 2] = -camera.focal_px * x / z**2
-    by_place[:, 1, 2] = -camera.focal_px * y / z**2
-    by_focal = camera.focal_px * np.column_stack([x, y])[..., None] / z[:, None, None]
-    return np.concatenate([-by_place @ cross_matrix(turned), by_place, by_focal], axis=2)
+    photo = np.zeros(len(points), np.int64)
+    projection = project_points(PinholeArrays.of([camera]), photo, points)
+    jacobian = projection.camera_jacobian()
+    jacobian[..., 5] = projection.rotated_jacobian[..., 2]
+    return jacobian

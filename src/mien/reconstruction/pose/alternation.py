@@ -68,11 +68,14 @@ def alternate(
     kept only if the next sweep finds a lower cost there, else the plain sweep's result is used.
 
     Args:
+        poses: initial values.
+        points: (N, 3) mm, initial values.
         image: (K, N, 2) px relative to the principal points.
         weights: (K, N), relative inverse variances, 0 unseen.
         loss: robust loss, and the deviation per axis of an observation of weight 1.
         sigma_px: robust loss, and the deviation per axis of an observation of weight 1.
         history: sweeps that the acceleration remembers; 0 is [Pighin 2002]'s plain iteration.
+        max_sweeps: at most.
         tolerance: relative decrease of the cost over five sweeps at which they have settled.
     """
     anchor, frame = points, _Frame(poses, points)

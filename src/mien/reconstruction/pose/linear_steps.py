@@ -82,7 +82,7 @@ def reprojection(poses: Poses, points: Float[Array, "n 3"]) -> Float[Array, "k n
 
 
 def step_scale(poses: Poses, points: Array, image: Array, weights: Array) -> Poses:
-    """s of every photo. `image` is (K, N, 2) px, `weights` (K, N); 0 drops an observation."""
+    """Scale s of every photo. `image` is (K, N, 2) px, `weights` (K, N); 0 drops an observation."""
     rotated, w = _rotated_and_w(poses, points, weights)
     a = rotated[..., :2] + poses.t[:, None]
     b = image * (1 + poses.eta[:, None] * rotated[..., 2])[..., None]
@@ -95,7 +95,7 @@ def step_scale(poses: Poses, points: Array, image: Array, weights: Array) -> Pos
 def step_points(
     poses: Poses, points: Array, image: Array, weights: Array, anchor: Array
 ) -> Float[Array, "n 3"]:
-    """m of every point. What no ray tells (a point seen once or never) is taken from anchor."""
+    """Points m. What no ray determines (a point seen once or never) is taken from anchor."""
     _, w = _rotated_and_w(poses, points, weights)
     s, eta = poses.s[:, None, None, None], poses.eta[:, None, None, None]
     a = image[..., None] * (eta * poses.R[:, None, 2:]) - s * poses.R[:, None, :2]
@@ -144,7 +144,7 @@ def step_shift(poses: Poses, points: Array, image: Array, weights: Array) -> Pos
 
 
 def step_depth(poses: Poses, points: Array, image: Array, weights: Array) -> Poses:
-    """eta of every photo, held to distances between 0.2 and 100 m."""
+    """Inverse depth eta of every photo, held to distances between 0.2 and 100 m."""
     rotated, w = _rotated_and_w(poses, points, weights)
     a = image * rotated[..., 2:]
     b = poses.s[:, None, None] * (rotated[..., :2] + poses.t[:, None]) - image
@@ -154,7 +154,7 @@ def step_depth(poses: Poses, points: Array, image: Array, weights: Array) -> Pos
 
 
 def bounded_eta(eta: Float[Array, " k"]) -> Float[Array, " k"]:
-    """eta held to distances between 0.2 and 100 m."""
+    """Inverse depth held to distances between 0.2 and 100 m."""
     return np.clip(eta, 1 / _FARTHEST_MM, 1 / _NEAREST_MM)
 
 

@@ -115,31 +115,34 @@ def joint_sigma(
 
 
 def moved_too_far(
-    problem: PoseProblem, solution: Alternation, trusted: Bool[Array, "k n"]
+    problem: PoseProblem, solution: Alternation, inliers: Bool[Array, "k n"]
 ) -> Bool[Array, " n"]:
     """Points that left the initial shape as no others did: two marks agreed on a wrong place."""
-    told = trusted.sum(axis=0) >= 2
-    if np.count_nonzero(told) < _MIN_ALIGNED:
-        return np.zeros(len(told), bool)
-    move = estimate_similarity(solution.points[told], problem.points[told])
+    determined = inliers.sum(axis=0) >= 2
+    if np.count_nonzero(determined) < _MIN_ALIGNED:
+        return np.zeros(len(determined), bool)
+    move = estimate_similarity(solution.points[determined], problem.points[determined])
     moved = np.linalg.norm(move(solution.points) - problem.points, axis=1)
-    limit = max(_MOVED_SIGMAS * robust_sigma(moved[told], 3), _LEAST_LIMIT_MM)
-    return told & (moved > limit)
+    limit = max(_MOVED_SIGMAS * robust_sigma(moved[determined], 3), _LEAST_LIMIT_MM)
+    return determined & (moved > limit)
 
 
 def rms_per_photo(
     problem: PoseProblem,
     solution: Alternation,
-    trusted: Bool[Array, "k n"],
+    inliers: Bool[Array, "k n"],
     *,
     weighted: bool = False,
 ) -> Float[Array, " k"]:
-    """Root mean square length of each photo's trusted reprojection errors, px.
+    """Root mean square length of each photo's inlier reprojection errors, px.
 
     Args:
+        problem: what was solved.
+        solution: of it.
+        inliers: (K, N) observations that count.
         weighted: count an error as what it would be for an observation of the largest weight.
     """
-    squared = np.where(trusted, residual_lengths(problem, solution) ** 2, 0.0)
+    squared = np.where(inliers, residual_lengths(problem, solution) ** 2, 0.0)
     if weighted:
         squared *= problem.weights / max(float(problem.weights.max()), np.finfo(float).tiny)
-    return np.sqrt(squared.sum(axis=1) / np.maximum(trusted.sum(axis=1), 1))
+    return np.sqrt(squared.sum(axis=1) / np.maximum(inliers.sum(axis=1), 1))

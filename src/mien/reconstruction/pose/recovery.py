@@ -39,7 +39,7 @@ _ROUNDS, _SWEEPS_A_ROUND = 6, 30
 """Robust rounds, each with the residual scale that the last one left."""
 _REJECT_SIGMAS = (7.0, 5.0)
 """First in the robust solution, then in the least squares on what is left."""
-_MIN_TRUSTED = 0.6
+_MIN_INLIERS = 0.6
 """Share of a photo's points that must agree with the other photos for it to count."""
 _MAX_RATIO, _MIN_MISFIT_MM = 4.0, 1.0
 """A photo whose points fit so much worse than the others', and so badly, shows something else."""
@@ -53,17 +53,17 @@ class PoseResult:
         cameras: one a photo; None where the photo was left out.
         points: (N, 3) mm, in the frame and scale of the initial shape; a point that fewer than two
             photos tell stays as it was.
-        trusted: (K, N) observations that were seen and fit.
-        rms_px: (K,) root mean square length of the trusted reprojection errors; NaN if left out.
+        inliers: (K, N) observations that were seen and fit.
+        rms_px: (K,) root mean square length of the inliers' reprojection errors; NaN if left out.
         problems: one a photo: why it was left out, "" if it fits.
-        cost: sum of squared reprojection errors of the trusted observations, px^2.
+        cost: sum of squared reprojection errors of the inliers, px^2.
         sweeps: rounds of five steps, all stages together.
         converged: whether the last stage settled.
     """
 
     cameras: tuple[Camera | None, ...]
     points: Float[Array, "n 3"]
-    trusted: Bool[Array, "k n"]
+    inliers: Bool[Array, "k n"]
     rms_px: Float[Array, " k"]
     problems: tuple[str, ...]
     cost: float
@@ -108,6 +108,8 @@ def recover_pose(
         history: sweeps that the acceleration remembers; 0 is [Pighin 2002]'s plain iteration.
         max_misfit_mm: a photo whose points lie farther (robust deviation) off the initial shape's
             best view shows something else.
+        max_sweeps: of each stage, at most.
+        tolerance: relative decrease of the cost at which a stage has settled.
 
     Raises:
         InputError: shapes, NaN, negative weights.
@@ -115,7 +117,7 @@ def recover_pose(
 
     Source:
         [Pighin 2002] sec. 5.1.1, eq. (2), app. A. Differs in the start from single photos, the
-        robust weights, the acceleration and the verdicts; the steps are [Pighin 2002]'s.
+        robust weights, the acceleration and the rejection of outliers, not in the steps.
     """
     problem = check_problem(image_points, points, sizes, principal_px, weights)
     settings = _Settings(loss, history, max_sweeps, tolerance)
@@ -125,11 +127,11 @@ def recover_pose(
         if not keep.any():
             raise EstimationError("no photo fits: " + "; ".join(sorted(set(problems))))
         kept = problem.of(keep)
-        solution, trusted = _solve(kept, start.of(keep), settings)
-        verdict = _disagreeing_photo(kept, solution, trusted)
-        if verdict is None:
-            return _result(problem, keep, tuple(problems), solution, trusted)
-        row, problem_text = verdict
+        solution, inliers = _solve(kept, start.of(keep), settings)
+        outlier = _disagreeing_photo(kept, solution, inliers)
+        if outlier is None:
+            return _result(problem, keep, tuple(problems), solution, inliers)
+        row, problem_text = outlier
         problems[np.flatnonzero(keep)[row]] = problem_text
 
 
@@ -198,17 +200,17 @@ def _solve(
         limit = _SWEEPS_A_ROUND if round_ < _ROUNDS - 1 else None
         state = _alternate(problem, state, seen, settings, settings.loss, sigma, limit)
         sweeps += state.sweeps
-    trusted, far = seen, np.zeros(seen.shape[1], bool)
+    inliers, far = seen, np.zeros(seen.shape[1], bool)
     for round_, limit_sigmas in enumerate(_REJECT_SIGMAS):
-        sigma = joint_sigma(problem, state, trusted, robust=round_ == 0)
-        far |= moved_too_far(problem, state, trusted)
+        sigma = joint_sigma(problem, state, inliers, robust=round_ == 0)
+        far |= moved_too_far(problem, state, inliers)
         fits = seen & ~far & (weighted_lengths(problem, state) <= limit_sigmas * sigma)
-        if round_ > 0 and (fits == trusted).all():
+        if round_ > 0 and (fits == inliers).all():
             break
-        trusted = fits
-        state = _alternate(problem, state, trusted, settings, "linear", 1.0)
+        inliers = fits
+        state = _alternate(problem, state, inliers, settings, "linear", 1.0)
         sweeps += state.sweeps
-    return replace(state, sweeps=sweeps), trusted
+    return replace(state, sweeps=sweeps), inliers
 
 
 def _alternate(
@@ -234,17 +236,17 @@ def _alternate(
 
 
 def _disagreeing_photo(
-    problem: PoseProblem, solution: Alternation, trusted: Bool[Array, "k n"]
+    problem: PoseProblem, solution: Alternation, inliers: Bool[Array, "k n"]
 ) -> tuple[int, str] | None:
     """The photo that agrees least with the others, if it disagrees, and how it does."""
     if len(problem.image) < 3:
         return None
-    shares = trusted.sum(axis=1) / np.count_nonzero(problem.weights, axis=1)
+    shares = inliers.sum(axis=1) / np.count_nonzero(problem.weights, axis=1)
     worst = int(shares.argmin())
-    if shares[worst] < _MIN_TRUSTED:
+    if shares[worst] < _MIN_INLIERS:
         return worst, f"only {100 * shares[worst]:.0f} % of its points agree with the other photos"
     # A photo of coarse marks may fit as much worse as its weights say.
-    rms_mm = rms_per_photo(problem, solution, trusted, weighted=True) / solution.poses.s
+    rms_mm = rms_per_photo(problem, solution, inliers, weighted=True) / solution.poses.s
     worst = int(rms_mm.argmax())
     ratio = rms_mm[worst] / max(float(np.median(np.delete(rms_mm, worst))), 1e-9)
     if ratio > _MAX_RATIO and rms_mm[worst] > _MIN_MISFIT_MM:
@@ -257,14 +259,14 @@ def _result(
     keep: Bool[Array, " k"],
     problems: tuple[str, ...],
     solution: Alternation,
-    trusted: Bool[Array, "k n"],
+    inliers: Bool[Array, "k n"],
 ) -> PoseResult:
     """The solution moved back onto the initial shape's frame and scale."""
     kept, poses = problem.of(keep), solution.poses
-    told = trusted.sum(axis=0) >= 2
+    determined = inliers.sum(axis=0) >= 2
     move = Similarity(1.0, np.eye(3), np.zeros(3))
-    if np.count_nonzero(told) >= 3:
-        move = estimate_similarity(solution.points[told], problem.points[told])
+    if np.count_nonzero(determined) >= 3:
+        move = estimate_similarity(solution.points[determined], problem.points[determined])
     cameras: list[Camera | None] = [None] * len(keep)
     for row, k in enumerate(np.flatnonzero(keep)):
         rotation = poses.R[row] @ move.rotation.T
@@ -277,16 +279,17 @@ def _result(
             t_cam_head=shift - rotation @ (move.translation + problem.center),
             principal_px=kept.principal[row],
         )
-    rms, all_trusted = np.full(len(keep), np.nan), np.zeros(problem.weights.shape, bool)
-    rms[keep], all_trusted[keep] = rms_per_photo(kept, solution, trusted), trusted
+    rms, all_inliers = np.full(len(keep), np.nan), np.zeros(problem.weights.shape, bool)
+    rms[keep], all_inliers[keep] = rms_per_photo(kept, solution, inliers), inliers
     lengths = residual_lengths(kept, solution)
     return PoseResult(
         cameras=tuple(cameras),
-        points=np.where(told[:, None], move(solution.points), problem.points) + problem.center,
-        trusted=all_trusted,
+        points=np.where(determined[:, None], move(solution.points), problem.points)
+        + problem.center,
+        inliers=all_inliers,
         rms_px=rms,
         problems=problems,
-        cost=float((lengths[trusted] ** 2).sum()),
+        cost=float((lengths[inliers] ** 2).sum()),
         sweeps=solution.sweeps,
         converged=solution.converged,
     )

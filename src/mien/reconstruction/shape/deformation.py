@@ -22,43 +22,44 @@ _EYEBALLS = ("left_eyeball", "right_eyeball")
 
 def deform_head(
     vertices: Float[Array, "v 3"],
-    places: Float[Array, "n 3"],
-    goals: Float[Array, "n 3"],
+    sources: Float[Array, "n 3"],
+    targets: Float[Array, "n 3"],
     generic: GenericHead,
     *,
     deviation_mm: Float[Array, " n"] | float = 0.0,
     kernel: str = "exponential",
 ) -> Float[Array, "v 3"]:
-    """All vertices moved smoothly so that the features go from their places to their goals.
+    """All vertices moved smoothly so that the features go from their sources to their targets.
 
     Far from every feature (the back of the head) the shape stays. Eyeballs stay round: each is
     moved and scaled as a whole.
 
     Args:
         vertices: (V, 3) mm, the shape so far.
-        places: (N, 3) mm, the features on it.
-        goals: (N, 3) mm, where they belong.
-        deviation_mm: how well a goal is known; 0 meets it exactly.
+        sources: (N, 3) mm, the features on it.
+        targets: (N, 3) mm, where they belong.
+        generic: the generic head.
+        deviation_mm: how well a target is known; 0 meets it exactly.
         kernel: as in fit_rbf.
 
     Source:
         [Pighin 2002] sec. 5.1.2, eq. (3); the anchors and the deviations are ours.
     """
-    anchors = _far_vertices(vertices, places, generic)
-    centers = np.concatenate([places, vertices[anchors]])
-    moves = np.concatenate([goals - places, np.zeros((len(anchors), 3))])
-    deviation = np.broadcast_to(deviation_mm, len(places))
+    anchors = _far_vertices(vertices, sources, generic)
+    centers = np.concatenate([sources, vertices[anchors]])
+    moves = np.concatenate([targets - sources, np.zeros((len(anchors), 3))])
+    deviation = np.broadcast_to(deviation_mm, len(sources))
     smoothing = np.append(deviation**2, np.zeros(len(anchors))) / ROUGHNESS_MM2
     moved: Array = vertices + fit_rbf(centers, moves, kernel=kernel, smoothing=smoothing)(vertices)
     return with_round_eyes(moved, vertices, generic)
 
 
 def _far_vertices(
-    vertices: Float[Array, "v 3"], places: Float[Array, "n 3"], generic: GenericHead
+    vertices: Float[Array, "v 3"], sources: Float[Array, "n 3"], generic: GenericHead
 ) -> Array:
     """Skin vertices far from any feature, spread out (farthest-point order)."""
     skin = np.unique(generic.mesh.triangles[generic.mesh.triangles_of("skin")])
-    far = skin[cKDTree(places).query(vertices[skin])[0] > ANCHOR_DISTANCE_MM]
+    far = skin[cKDTree(sources).query(vertices[skin])[0] > ANCHOR_DISTANCE_MM]
     if len(far) == 0:
         return np.zeros(0, np.int64)
     chosen = [int(far[0])]
@@ -89,7 +90,7 @@ def eye_centers(mesh: Mesh) -> Float[Array, "2 3"]:
 
 def vertex_uncertainty(
     vertices: Float[Array, "v 3"],
-    places: Float[Array, "n 3"],
+    points: Float[Array, "n 3"],
     deviation_mm: Float[Array, " n"],
     *,
     prior_mm: float,
@@ -98,12 +99,13 @@ def vertex_uncertainty(
     """(V,) mm: near a feature what is known of it, far from all what the prior leaves open.
 
     Args:
-        places: (N, 3) mm.
+        vertices: (V, 3) mm.
+        points: (N, 3) mm, the features.
         deviation_mm: (N,) of the features there.
-        prior_mm: deviation of a place that nothing tells about.
+        prior_mm: deviation of a point without observations.
         reach_mm: how far a feature speaks for its neighbourhood.
     """
-    distance, nearest = cKDTree(places).query(vertices)
+    distance, nearest = cKDTree(points).query(vertices)
     share = np.exp(-((distance / reach_mm) ** 2))
     known = np.minimum(deviation_mm[nearest], prior_mm)
     return np.sqrt(share * known**2 + (1 - share) * prior_mm**2)

@@ -15,12 +15,12 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.reconstruction.features import Features
 from mien.reconstruction.shape.deformation import deform_head
-from mien.reconstruction.triangulation import intersect_rays
+from mien.reconstruction.triangulation import triangulate
 
 IDENTITY_SIGMA_MM = 3.0
 """How far a feature lies off the identity basis, its meaning on another face included."""
 SEEN_ONCE_SIGMA_MM = 1.0
-"""How well at best a feature that one photo shows tells the surface: its depth is a guess."""
+"""Least standard deviation of a feature that one photo shows: its depth is not measured."""
 
 
 def shape_from_features(
@@ -34,16 +34,21 @@ def shape_from_features(
 ) -> Float[Array, "v 3"]:
     """(V, 3) mm: the generic head as this person, then moved to the features.
 
-    Features seen in several photos come first, since they carry depth. Those seen once are
-    then put on their ray next to where the head has come to lie, as often as `rounds` says.
+    Features observed in several photos come first, since they carry depth. Those observed once are
+    then put on their ray at the point nearest to the head, `rounds` times.
 
     Args:
-        points: (N, 3) mm, where the features seen twice lie.
+        features: of K photos.
+        points: (N, 3) mm, of the features observed twice.
+        cameras: of the photos.
+        generic: the generic head.
+        kernel: as in fit_rbf.
+        rounds: repetitions for features observed once.
 
     Source:
         [Pighin 2002] sec. 5.1.3, repeated; the identity basis beneath is ours.
     """
-    twice = features.seen.sum(axis=0) > 1
+    twice = features.observed.sum(axis=0) > 1
     deviation = features.sigma_mm.min(axis=0)
     coefficients = estimate_identity(features, points, generic)
     vertices = generic.mesh.vertices + generic.identity.offsets(coefficients)
@@ -57,7 +62,7 @@ def shape_from_features(
     deviation = np.where(twice, deviation, np.maximum(deviation, SEEN_ONCE_SIGMA_MM))
     for _ in range(rounds):
         places = features.on(vertices)
-        on_rays = intersect_rays(cameras, features.image_points, current=places).points
+        on_rays = triangulate(cameras, features.image_points, current=places).points
         goals = np.where(twice[:, None], points, on_rays)
         vertices = deform_head(
             vertices, places, goals, generic, deviation_mm=deviation, kernel=kernel

@@ -18,13 +18,13 @@ BENDING = 12.0
 """How stiff skin is: weight (mm^2) of its squared mean bending against squared distances over their
 variance."""
 REACH_MM = 25.0
-"""Far from all that is seen a movement fades over so much."""
+"""Distance over which a movement fades away from all observations."""
 HELD_SD_MM = 0.3
 """How far skin moves where it is held."""
 _ROUNDS = 3
 
 
-def move_skin(
+def deform_skin(
     vertices: Float[Array, "v 3"],
     observations: SurfaceObservations,
     cameras: Sequence[Camera],
@@ -33,13 +33,16 @@ def move_skin(
     held: Float[Array, " v"],
     across_sd_mm: float | None = None,
 ) -> Float[Array, "v 3"]:
-    """The head with its skin where the photos show it; what one photo cannot tell stays.
+    """The head with its skin where the photos show it; what one photo leaves open stays.
 
     Minimizes the Cauchy-weighted squared reprojection errors plus BENDING * bending(d) over
     the movements d of all skin, the mouth's inside included, which goes along over the lips.
 
     Args:
         vertices: (V, 3) mm, the head so far.
+        observations: of the skin.
+        cameras: of the photos.
+        generic: the generic head.
         held: (V,) in [0, 1]: where skin is to stay.
         across_sd_mm: how far the skin may move along its normals; None leaves it free.
     """
@@ -80,7 +83,7 @@ def _normal_equations(
     errors = reproject(observations, observations.on(vertices) + observations.offset, cameras)
     used: Bool[Array, " m"] = np.asarray((number[observations.corners] >= 0).all(axis=1))
     count = len(used)
-    # Two rows a sighting; in each its place's three corners, each with three movements.
+    # Two rows an observation; in each its point's three corners, each with three movements.
     by_place = errors.projection.point_jacobian
     values = observations.barycentrics[:, None, :, None] * by_place[:, :, None, :]
     columns = 3 * np.maximum(number[observations.corners], 0)[:, None, :, None] + np.arange(3)

@@ -1,4 +1,4 @@
-"""Words in pictures of tracked frames."""
+"""Text in pictures of tracked frames."""
 
 from __future__ import annotations
 
@@ -14,44 +14,49 @@ if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont
 
 Colour = tuple[int, int, int]
-_BELOW: Colour = (24, 25, 29)
-_PLAIN: Colour = (205, 207, 214)
-# Told apart by those who cannot tell red from green, too: by brightness and by the words.
+_DARK: Colour = (24, 25, 29)
+_LIGHT: Colour = (205, 207, 214)
+# Distinguishable without seeing red and green, too: by brightness and by the words.
 STATUS_COLOURS: dict[str, Colour] = {
     "ok": (120, 200, 255),
     "reacquired": (255, 200, 60),
     "lost": (255, 96, 64),
 }
 _COLUMNS = (0.6, 7.5, 13.0, 20.0, 28.0)
-"""Where the words of a caption begin, in sizes of its letters: so that they stand still."""
+"""Where the words of a caption begin, in letter sizes: fixed, so that they do not move."""
 
 
-def caption(found: TrackedFrame, width: int) -> UInt8[Array, "h w 3"]:
-    """(h, width, 3): number, time and status of a frame, and how well it was explained."""
+def frame_caption(frame: TrackedFrame, width: int) -> UInt8[Array, "h w 3"]:
+    """(h, width, 3): number, time and status of a frame, RMS error and visible share.
+
+    Args:
+        frame: that is described.
+        width: of the picture, px.
+    """
     from PIL import Image, ImageDraw
 
     size = _text_size(width)
     height = 2 * round(0.9 * size)
-    strip = Image.new("RGB", (width, height), _BELOW)
+    strip = Image.new("RGB", (width, height), _DARK)
     draw = ImageDraw.Draw(strip)
-    words = [f"frame {found.frame}", f"{found.time:.2f} s", found.status.replace("lost", "LOST")]
-    if found.state is not None:
-        words += [f"error {found.rms:.1f} rms", f"{100 * found.seen:.0f} % seen"]
+    words = [f"frame {frame.frame}", f"{frame.time:.2f} s", frame.status.replace("lost", "LOST")]
+    if frame.state is not None:
+        words += [f"error {frame.rms:.1f} rms", f"{100 * frame.seen:.0f} % seen"]
     for index, (left, word) in enumerate(zip(_COLUMNS, words, strict=False)):
-        colour = STATUS_COLOURS[found.status] if index == 2 else _PLAIN
+        colour = STATUS_COLOURS[frame.status] if index == 2 else _LIGHT
         draw.text((left * size, height / 2), word, colour, _font(size), anchor="lm")
     return np.asarray(strip)
 
 
-def say_lost(picture: UInt8[Array, "h w 3"]) -> UInt8[Array, "h w 3"]:
+def mark_lost(picture: UInt8[Array, "h w 3"]) -> UInt8[Array, "h w 3"]:
     """The picture with LOST in its middle."""
-    return write_on(picture, "LOST", STATUS_COLOURS["lost"], size=picture.shape[1] // 7)
+    return draw_text(picture, "LOST", STATUS_COLOURS["lost"], size=picture.shape[1] // 7)
 
 
-def write_on(
+def draw_text(
     picture: UInt8[Array, "h w 3"],
     word: str,
-    colour: Colour = _PLAIN,
+    colour: Colour = _LIGHT,
     *,
     at: tuple[float, float] = (0.5, 0.5),
     size: int,
@@ -60,9 +65,12 @@ def write_on(
     """The picture with a word on it.
 
     Args:
+        picture: sRGB.
+        word: that is drawn.
+        colour: of the letters, sRGB.
         at: the word's middle, as shares of width and height.
         size: of the letters, px.
-        outline: dark, so many px wide, where one does not know what is behind the word.
+        outline: width of a dark outline, px, for pictures of any brightness.
     """
     from PIL import Image, ImageDraw
 
@@ -76,19 +84,19 @@ def write_on(
         _font(max(size, 6)),
         anchor="mm",
         stroke_width=outline,
-        stroke_fill=_BELOW,
+        stroke_fill=_DARK,
     )
     return np.asarray(image)
 
 
 def _text_size(width: int) -> int:
-    """Of a caption's letters, px: as large as has room, and no larger than one reads with ease."""
+    """Size of a caption's letters, px, from 6 to 20."""
     return int(np.clip(width / 50, 6, 20))
 
 
 @cache
 def _font(size: int) -> FreeTypeFont:
-    """The one that comes with Pillow, so that a caption looks the same everywhere."""
+    """Pillow's own font, so that a caption looks the same on every computer."""
     from PIL import ImageFont
 
     font = ImageFont.load_default(size)

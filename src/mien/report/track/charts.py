@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mien.arrays import Array, Float
-from mien.report.track.series import (
+from mien.track.series import (
     Series,
     quaternions,
     rotation_errors,
@@ -19,20 +19,20 @@ from mien.report.track.series import (
 from mien.track.state import GAZE, Track
 
 _WEIGHTS = (0.0, 1.0)
-_MOST_UNITS = 12
+_MAX_UNITS = 12
 _BLINKS = ("units.eyeBlinkLeft", "units.eyeBlinkRight")
 
 
 @dataclass(frozen=True)
 class Row:
-    """One number by frame.
+    """One curve over the frames.
 
     Attributes:
         label: with its unit.
         values: (N,).
-        deviations: (N,) one standard deviation.
-        truth: (N,).
-        limits: that the plot shows at least.
+        deviations: (N,) standard deviations.
+        truth: (N,) reference values.
+        limits: lowest and highest value that the plot shows at least.
     """
 
     label: str
@@ -44,28 +44,29 @@ class Row:
 
 @dataclass(frozen=True)
 class Plot:
-    """Numbers that belong together.
+    """Curves in one figure.
 
     Attributes:
         name: of its file.
-        title: what it shows.
-        caption: what it shows.
+        title: above it.
+        caption: below it on the page.
         rows: from top to bottom.
-        alike: whether all rows have one scale.
+        shared_scale: whether all rows have one scale.
     """
 
     name: str
     title: str
     caption: str
     rows: tuple[Row, ...]
-    alike: bool = False
+    shared_scale: bool = False
 
 
-def plots_of(track: Track, reference: Track | None = None) -> list[Plot]:
-    """All that there is to plot of a track.
+def build_plots(track: Track, reference: Track | None = None) -> list[Plot]:
+    """All plots of a track.
 
     Args:
-        reference: what is known to be true of the same frames.
+        track: that is plotted.
+        reference: ground truth of the same frames, if there is any.
     """
     series = series_of(track)
     truth = None if reference is None else truth_for(track, reference)
@@ -102,21 +103,25 @@ def _weights_plot(region: str, track: Track, series: Series, truth: Series | Non
         _channel_row(name, f"{region}.{name}", series, truth) for name in track.layout.expressions
     )
     caption = f"Weights of the photographed expressions in the {region} region; they sum to 1."
-    return Plot(f"weights_{region}", f"Blending weights: {region}", caption, rows, alike=True)
+    return Plot(
+        f"weights_{region}", f"Blending weights: {region}", caption, rows, shared_scale=True
+    )
 
 
 def _units_plot(track: Track, series: Series, truth: Series | None) -> Plot:
-    """Of the units that move most; blinks are with the eyes."""
+    """The units that move most; blinks are in the plot of the eyes."""
     names = [f"units.{name}" for name in track.layout.units]
     names = [name for name in names if name not in _BLINKS]
-    moved = [_spread(series.values[name]) for name in names]
-    most = sorted(np.argsort(moved)[::-1][:_MOST_UNITS].tolist())
+    ranges = [_range(series.values[name]) for name in names]
+    chosen = sorted(np.argsort(ranges)[::-1][:_MAX_UNITS].tolist())
     rows = tuple(
         _channel_row(names[index].removeprefix("units."), names[index], series, truth)
-        for index in most
+        for index in chosen
     )
-    which = "" if len(most) == len(names) else f" The {len(most)} of {len(names)} that move most."
-    return Plot("units", "Face units", f"Weights of face units.{which}", rows, alike=True)
+    which = (
+        "" if len(chosen) == len(names) else f" The {len(chosen)} of {len(names)} that move most."
+    )
+    return Plot("units", "Face units", f"Weights of face units.{which}", rows, shared_scale=True)
 
 
 def _eyes_plot(series: Series, truth: Series | None) -> Plot:
@@ -187,6 +192,6 @@ def _channel_row(
     )
 
 
-def _spread(values: Float[Array, " n"]) -> float:
+def _range(values: Float[Array, " n"]) -> float:
     finite = values[np.isfinite(values)]
     return float(np.ptp(finite)) if len(finite) else 0.0

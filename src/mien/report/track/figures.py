@@ -1,4 +1,4 @@
-"""Plots of a track as pictures."""
+"""Plots of a track as image files."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import numpy as np
 from mien.arrays import Array, Bool
 from mien.io.files.atomic import atomic_file
 from mien.report.track.charts import Plot, Row
-from mien.report.track.series import Series
+from mien.track.series import Series
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito's colours, which all eyes tell apart; the truth is told by its dashes, too.
-_FOUND, _TRUTH, _ANEW, _LOST = "#0072B2", "#1a1a1a", "#D55E00", "#d9d9d9"
+# Okabe and Ito's colours, safe for the colour-blind; the truth is dashed in addition.
+_TRACKED, _TRUTH, _REACQUIRED, _LOST = "#0072B2", "#1a1a1a", "#D55E00", "#d9d9d9"
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9,
@@ -41,8 +41,8 @@ _WIDTH, _ROW, _ABOVE, _BELOW = 10.0, 0.82, 0.6, 0.5
 """Inches: of the whole, of a row, and of what is above and below the rows."""
 _LEFT, _RIGHT = 2.0, 0.2
 _DPI = 130
-_MANY = 2000
-"""Frames, from where on lines are thin."""
+_MANY_FRAMES = 2000
+"""With so many frames or more, lines are thin."""
 _MARGIN = 0.06
 """Above and below a row's numbers, as a share of their range."""
 
@@ -52,7 +52,8 @@ def save_figure(path: str | Path, plot: Plot, series: Series) -> None:
 
     Args:
         path: .png or .svg.
-        series: that the plot is of.
+        plot: that is drawn.
+        series: of the track that it is of.
 
     Raises:
         InputError: a place that cannot be written.
@@ -86,7 +87,7 @@ def _draw(plot: Plot, series: Series) -> Figure:
         bottom=_BELOW / height,
         hspace=0.28,
     )
-    for axis, row, limits in zip(axes, plot.rows, limits_of(plot), strict=True):
+    for axis, row, limits in zip(axes, plot.rows, row_limits(plot), strict=True):
         _draw_row(axis, row, series)
         axis.set_ylim(*limits)
     first, last = series.numbers[[0, -1]].tolist()
@@ -99,18 +100,18 @@ def _draw(plot: Plot, series: Series) -> Figure:
 
 
 def _draw_row(axis: Axes, row: Row, series: Series) -> None:
-    frames, found = series.numbers, row.values
-    for first, end in stretches(series.lost):
+    frames, values = series.numbers, row.values
+    for first, end in true_runs(series.lost):
         axis.axvspan(frames[first] - 0.5, frames[end - 1] + 0.5, color=_LOST, lw=0)
-    for frame in frames[_anew(series)].tolist():
-        axis.axvline(frame, ymin=0.8, color=_ANEW, lw=1.2)
+    for frame in frames[_reacquired(series)].tolist():
+        axis.axvline(frame, ymin=0.8, color=_REACQUIRED, lw=1.2)
     if row.deviations is not None:
-        low, high = found - row.deviations, found + row.deviations
-        axis.fill_between(frames, low, high, color=_FOUND, alpha=0.22, lw=0)
-    width = 1.4 if len(frames) < _MANY else 0.7
-    axis.plot(frames, found, color=_FOUND, lw=width, solid_joinstyle="round")
-    alone = _alone(np.isfinite(found))
-    axis.plot(frames[alone], found[alone], "o", color=_FOUND, ms=3)
+        low, high = values - row.deviations, values + row.deviations
+        axis.fill_between(frames, low, high, color=_TRACKED, alpha=0.22, lw=0)
+    width = 1.4 if len(frames) < _MANY_FRAMES else 0.7
+    axis.plot(frames, values, color=_TRACKED, lw=width, solid_joinstyle="round")
+    isolated = _isolated(np.isfinite(values))
+    axis.plot(frames[isolated], values[isolated], "o", color=_TRACKED, ms=3)
     if row.truth is not None:
         axis.plot(frames, row.truth, color=_TRUTH, lw=1.1, dashes=(4, 2.5))
     axis.locator_params(axis="y", nbins=4)
@@ -121,19 +122,19 @@ def _draw_row(axis: Axes, row: Row, series: Series) -> None:
 
 
 def _add_legend(figure: Figure, plot: Plot, series: Series, top: float) -> None:
-    """What the lines and colours mean, of those that there are."""
+    """The legend of the lines and colours that occur."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    handles: list[Line2D | Patch] = [Line2D([], [], color=_FOUND, lw=1.6, label="tracked")]
+    handles: list[Line2D | Patch] = [Line2D([], [], color=_TRACKED, lw=1.6, label="tracked")]
     if any(row.deviations is not None for row in plot.rows):
-        handles.append(Patch(color=_FOUND, alpha=0.22, lw=0, label="± one standard deviation"))
+        handles.append(Patch(color=_TRACKED, alpha=0.22, lw=0, label="± one standard deviation"))
     if any(row.truth is not None for row in plot.rows):
         handles.append(Line2D([], [], color=_TRUTH, lw=1.1, dashes=(4, 2.5), label="truth"))
     if series.lost.any():
         handles.append(Patch(color=_LOST, lw=0, label="lost"))
-    if _anew(series).any():
-        handles.append(Line2D([], [], color=_ANEW, lw=1.2, label="found anew"))
+    if _reacquired(series).any():
+        handles.append(Line2D([], [], color=_REACQUIRED, lw=1.2, label="found anew"))
     figure.legend(
         handles=handles,
         loc="center right",
@@ -146,36 +147,36 @@ def _add_legend(figure: Figure, plot: Plot, series: Series, top: float) -> None:
     )
 
 
-def limits_of(plot: Plot) -> list[tuple[float, float]]:
-    """What every row shows, from lowest to highest: all of its numbers and of the truth; a
+def row_limits(plot: Plot) -> list[tuple[float, float]]:
+    """The lowest and highest value that each row shows: all of its numbers and of the truth.
 
-    deviation, where hardly anything is known, may reach out of it.
+    A deviation, where hardly anything is known, may reach out of it.
     """
-    found = []
+    limits = []
     for row in plot.rows:
         shown = np.concatenate([row.values, () if row.truth is None else row.truth])
         shown = np.concatenate([shown[np.isfinite(shown)], row.limits or ()])
         low, high = (shown.min(), shown.max()) if len(shown) else (0.0, 1.0)
-        found.append((float(low), float(high)))
-    if plot.alike:
-        found = [(min(low for low, _ in found), max(high for _, high in found))] * len(found)
-    margins = [_MARGIN * (high - low) or 0.5 for low, high in found]
+        limits.append((float(low), float(high)))
+    if plot.shared_scale:
+        limits = [(min(low for low, _ in limits), max(high for _, high in limits))] * len(limits)
+    margins = [_MARGIN * (high - low) or 0.5 for low, high in limits]
     return [
-        (low - margin, high + margin) for (low, high), margin in zip(found, margins, strict=True)
+        (low - margin, high + margin) for (low, high), margin in zip(limits, margins, strict=True)
     ]
 
 
-def stretches(mask: Bool[Array, " n"]) -> Iterator[tuple[int, int]]:
-    """First and end of every run that is true."""
+def true_runs(mask: Bool[Array, " n"]) -> Iterator[tuple[int, int]]:
+    """First index, and the one after the last, of every run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
     yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
 
-def _anew(series: Series) -> Bool[Array, " n"]:
+def _reacquired(series: Series) -> Bool[Array, " n"]:
     return np.array([status == "reacquired" for status in series.status], bool)
 
 
-def _alone(finite: Bool[Array, " n"]) -> Bool[Array, " n"]:
-    """What no line shows: numbers with none beside them."""
-    beside = np.pad(finite, 1)
-    return finite & ~beside[:-2] & ~beside[2:]
+def _isolated(finite: Bool[Array, " n"]) -> Bool[Array, " n"]:
+    """Numbers between two that are not finite: a line would not show them."""
+    padded = np.pad(finite, 1)
+    return finite & ~padded[:-2] & ~padded[2:]

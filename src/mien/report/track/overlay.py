@@ -1,4 +1,4 @@
-"""A video of what was tracked: the frame, the model over it, and the model alone."""
+"""A video of a track: the frame, the drawn face blended over it, and the drawn head."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from mien.io.files.video import save_video
 from mien.progress import StepProgress, no_step_progress
 from mien.render.picture import GREY, HeadRenderer
 from mien.render.shade import over_background
-from mien.report.track.caption import caption, say_lost
-from mien.report.track.comparison import draw_tracked
-from mien.report.track.window import Window, window_of
+from mien.report.track.caption import frame_caption, mark_lost
+from mien.report.track.comparison import draw_tracked_head
+from mien.report.track.window import Window, crop_window
 from mien.track.state import Track, TrackedFrame
 
-Frames = Iterable[tuple[UInt8[Array, "h w 3"], TrackedFrame]]
-"""Pixels, and what was found in them."""
+TrackedPixels = Iterable[tuple[UInt8[Array, "h w 3"], TrackedFrame]]
+"""Pixels of frames, and what was tracked in them."""
 
 PANELS = 3
 MAX_WIDTH, MAX_HEIGHT = 1920, 1080
 """Of the overlay's pictures, px, their caption not counted."""
-_LONGEST_SECONDS = 10.0
-"""That a frame is held where a clock jumps."""
+_MAX_GAP_SECONDS = 10.0
+"""A gap between frames, where a clock jumps, counts as no longer than this."""
 
 
-def write_overlay(
+def save_overlay(
     path: str | Path,
     video: str | Path | Video,
     track: Track,
@@ -41,7 +41,7 @@ def write_overlay(
     *,
     progress: StepProgress = no_step_progress,
 ) -> int:
-    """Write a video of what was tracked, whole or not at all.
+    """Write the video, whole or not at all.
 
     Its rate is that of the track's shortest intervals; a frame that stays longer, in a video of
     variable rate or where frames are missing, is repeated, so that all keep their times.
@@ -49,64 +49,70 @@ def write_overlay(
     Args:
         path: .mp4 or .webm.
         video: that was tracked; it is decoded again.
-        progress: told the tracked frames done and their total.
+        track: of the video.
+        head: that was tracked.
+        progress: called with the tracked frames done and their total.
 
     Returns:
-        how many frames were written.
+        How many frames were written.
 
     Raises:
         InputError: another suffix, a video of another size than the track's, one without any of its
             frames, a place that cannot be written.
         FileFormatError: not a video.
     """
-    fps, counts = held(np.array([found.time for found in track.frames]), track.fps)
+    fps, counts = repeat_counts(np.array([frame.time for frame in track.frames]), track.fps)
 
-    def shown(frames: Frames) -> Iterator[UInt8[Array, "h w 3"]]:
+    def repeated(frames: TrackedPixels) -> Iterator[UInt8[Array, "h w 3"]]:
         progress(0, len(counts))
         pictures = zip(overlay_frames(frames, track, head), counts.tolist(), strict=False)
         for done, (picture, count) in enumerate(pictures, 1):
             yield from repeat(picture, count)
             progress(done, len(counts))
 
-    with read_ahead(decoded(video, track), AHEAD) as frames:
-        return save_video(path, shown(frames), fps)
+    with read_ahead(decode_tracked_frames(video, track), AHEAD) as frames:
+        return save_video(path, repeated(frames), fps)
 
 
 def overlay_frames(
-    frames: Frames,
+    frames: TrackedPixels,
     track: Track,
     head: Head | HeadRenderer,
 ) -> Iterator[UInt8[Array, "h w 3"]]:
-    """For every frame a picture of it, beside it the frame with the drawn face over it, beside
+    """For every frame three panels side by side with a caption below.
 
-    that the drawn head alone; a caption below. A lost frame is alone.
-
-    Frames too large to stand side by side within 1920 px are cut to where the head goes in the
-    whole track, and reduced in size if that is not enough.
+    They are the frame, the frame with the drawn face blended over it, and the drawn head; of a lost
+    frame only the first. Frames too large for panels within 1920 px are cropped to the bounds of
+    the head in the whole track, and reduced in size if that is not enough.
 
     Args:
-        frames: pixels, sRGB, as large as the track's or reduced, and what was found in them.
+        frames: pixels, sRGB, as large as the track's or reduced, and what was tracked in them.
         track: that they are of.
+        head: that was tracked.
     """
     renderer = head if isinstance(head, HeadRenderer) else HeadRenderer(head)
-    window = window_of(track, renderer.head, (MAX_WIDTH // PANELS, MAX_HEIGHT))
-    for pixels, found in frames:
-        frame = window.cut(pixels, track)
-        panels = [frame, *_drawn(frame, found, track, renderer, window)]
+    window = crop_window(track, renderer.head, (MAX_WIDTH // PANELS, MAX_HEIGHT))
+    for pixels, tracked in frames:
+        frame = window.crop(pixels, track)
+        panels = [frame, *_head_panels(frame, tracked, track, renderer, window)]
         picture = np.concatenate(panels, axis=1)
-        yield np.concatenate([picture, caption(found, picture.shape[1])])
+        yield np.concatenate([picture, frame_caption(tracked, picture.shape[1])])
 
 
-def decoded(
+def decode_tracked_frames(
     video: str | Path | Video, track: Track
 ) -> Generator[tuple[UInt8[Array, "h w 3"], TrackedFrame]]:
-    """The frames of a video that a track is of, with what was found in them.
+    """The frames of a video that a track has, with what was tracked in them.
+
+    Args:
+        video: that was tracked.
+        track: of the video.
 
     Raises:
         InputError: a video of another size.
         FileFormatError: not a video.
     """
-    by_number = {found.frame: found for found in track.frames}
+    by_number = {tracked.frame: tracked for tracked in track.frames}
     last = max(by_number, default=-1)
     clip = video if isinstance(video, Video) else Video(Path(video))
     with closing(clip.frames()) as frames:
@@ -125,17 +131,14 @@ def _pixels(frame: Frame, path: Path, track: Track) -> UInt8[Array, "h w 3"]:
     return pixels
 
 
-def held(times: Float[Array, " n"], fps: float) -> tuple[float, Int[Array, " n"]]:
-    """A constant rate, and how often it shows each frame for all to keep their times; once at
-
-    least.
+def repeat_counts(times: Float[Array, " n"], fps: float) -> tuple[float, Int[Array, " n"]]:
+    """A constant rate, and how often each frame is shown, once at least, to keep their times.
 
     Args:
-        times: seconds. A clock that jumps back is taken to have stood still, one that jumps ahead
-            to have gone on for ten seconds.
-        fps: where there are no two frames that tell.
+        times: (N,) seconds. A jump back counts as no time, a jump ahead as ten seconds at most.
+        fps: the rate where no two frames differ in time.
     """
-    gaps = np.clip(np.diff(times), 0, _LONGEST_SECONDS)
+    gaps = np.clip(np.diff(times), 0, _MAX_GAP_SECONDS)
     if not gaps.any():
         return fps, np.ones(len(times), np.int64)
     shortest = np.quantile(gaps[gaps > 0], 0.05)
@@ -145,17 +148,17 @@ def held(times: Float[Array, " n"], fps: float) -> tuple[float, Int[Array, " n"]
     return float(rate), np.append(counts, 1)
 
 
-def _drawn(
+def _head_panels(
     frame: UInt8[Array, "h w 3"],
-    found: TrackedFrame,
+    tracked: TrackedFrame,
     track: Track,
     renderer: HeadRenderer,
     window: Window,
 ) -> tuple[UInt8[Array, "h w 3"], UInt8[Array, "h w 3"]]:
-    """The face over the frame, and the head alone."""
-    camera = None if found.state is None else window.camera(track, found.state)
-    drawn = draw_tracked(renderer, track, found, camera)
+    """The face blended over the frame, and the head alone."""
+    camera = None if tracked.state is None else window.camera(track, tracked.state)
+    drawn = draw_tracked_head(renderer, track, tracked, camera)
     if drawn is None:
         empty = np.full_like(frame, GREY)
-        return say_lost(empty), empty
-    return drawn.over(frame), over_background(drawn.picture, GREY)[..., :3]
+        return mark_lost(empty), empty
+    return drawn.blended_over(frame), over_background(drawn.picture, GREY)[..., :3]

@@ -11,7 +11,7 @@ from mien.arrays import Array, Float, check_array, frozen
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.generic import load_generic_head
 from mien.head import Head
-from mien.reconstruction.expression.gaze import MOST_RAD, yaw_pitch_of
+from mien.reconstruction.expression.gaze import MAX_GAZE_RAD, yaw_pitch_from_directions
 from mien.rig.followers import part_vertices
 from mien.rig.gaze import SIDES
 from mien.rig.rig import Rig
@@ -180,8 +180,8 @@ class HeadSynthesizer:
         pupils = [self.layout.index(f"{side}_pupil") for side in SIDES]
         directions = np.stack([points[pupils], feature_points_on(vertices)[pupils]]) - centres
         directions /= np.linalg.norm(directions, axis=2, keepdims=True)
-        target, current = map(yaw_pitch_of, directions)
-        return np.clip(target - current, -MOST_RAD, MOST_RAD)
+        target, current = map(yaw_pitch_from_directions, directions)
+        return np.clip(target - current, -MAX_GAZE_RAD, MAX_GAZE_RAD)
 
     def _fitted_model(self) -> DisplacementModel:
         expressions = self.examples[1:] - self.examples[0]

@@ -16,7 +16,7 @@ from mien.numeric.kernels.jit import njit
 from mien.numeric.kernels.threads import for_row_bands
 from mien.numeric.raster.rasterizer import Raster, empty_raster, rasterize_rows
 from mien.render.mipmap import Four, Pyramids, level_of_detail, place_lookup, weighted_texels
-from mien.render.mix import Painted
+from mien.render.multitexture import TexturedMesh
 from mien.rig.state import PosedFace
 from mien.track.image.frame_pyramid import FrameCrop, Intrinsics
 from mien.track.image.greyscale import GreyPyramids, add_greys
@@ -63,7 +63,7 @@ class Drawing(NamedTuple):
 
 
 def draw(
-    painted: Painted,
+    painted: TexturedMesh,
     grey: GreyPyramids,
     compared: Bool[Array, " f"],
     face: PosedFace,
@@ -98,7 +98,7 @@ def draw(
 
 
 def draw_colours(
-    painted: Painted, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, crop: FrameCrop
+    painted: TexturedMesh, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, crop: FrameCrop
 ) -> tuple[Float[Array, "h w 3"], Float[Array, "h w"]]:
     """The mixture in colour, 0 to 255, and a mask of the compared triangles."""
     projected = _projected(painted, compared, face, pose, crop)
@@ -160,7 +160,7 @@ class _Projected:
 
 
 def _projected(
-    painted: Painted, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, crop: FrameCrop
+    painted: TexturedMesh, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, crop: FrameCrop
 ) -> _Projected:
     """The face in front of the crop's camera, not rasterized yet."""
     count, textures = face.weights.shape
@@ -171,7 +171,7 @@ def _projected(
     shades = np.empty((count, 2 + textures), np.float32)
     inputs = (face.vertices, face.brightness, face.weights)
     _project_vertices(*inputs, motion, intrinsics, positions, points, depth, shades)
-    # As sharp as a picture of four samples a pixel (render.mix).
+    # As sharp as a picture of four samples a pixel (render.multitexture).
     shades[:, 0] = level_of_detail(painted.texels, points, painted.triangles) - 0.5
     surface = _Surface(compared, painted.triangles, painted.uvs, shades)
     return _Projected(surface, positions, frozen(points), frozen(depth), empty_raster(*crop.size))

@@ -12,7 +12,7 @@ from mien.render.mipmap import UNIT, Four, Pyramids
 
 LUMA = (0.299, 0.587, 0.114)
 """Of red, green and blue (BT.601). Faces are compared in shades of grey: as accurate as in colour,
-at a third of the cost (docs/notes/tracking.md)."""
+at a third of the cost (docs/notes/tracking-experiments.md)."""
 STEPS = 256
 _FINEST = 1024
 """Px of a texture's side: faces are compared at sizes that need no finer level."""

@@ -17,27 +17,34 @@ from mien.numeric.rotation import angle_between
 from mien.numeric.solvers.schur import BlockSystem
 from mien.reconstruction.bundle.projection import CAMERA_SIZE
 from mien.track.landmarks.detector_bias import at_landmarks
-from mien.track.landmarks.fit import MOST, Guess, MarkProblem, Observation, fit_face
-from mien.track.landmarks.initialization import Found, Starter
-from mien.track.landmarks.model import REPEATED_MM
+from mien.track.landmarks.fit import (
+    MAX_WEIGHT,
+    LandmarkObservation,
+    LandmarkProblem,
+    PoseAndFace,
+    fit_face,
+)
+from mien.track.landmarks.initialization import HeadDetection, HeadDetector
+from mien.track.landmarks.model import LANDMARK_SD_MM
 from mien.track.lens import LogFocal, expected_focal
 
-MOST_FRAMES = 8
+MAX_FOCAL_FRAMES = 8
 """More add little."""
-_OTHERWISE_RAD, _OTHERWISE_NEAR = np.radians(5.0), 0.08
-"""A frame tells something new when its head is turned by this much or as much (in log distance)
-nearer than in all that were used: landmarks err alike where heads are seen alike."""
-_WAYS = 24
-"""Of heads to differ, the greatest first: landmarks are off in ways that look like a shape."""
-_SHOWN = 0.65
-"""Of a change of perspective, the detector's landmarks follow this share. The estimate is right all
-the same, for pictures of the head tell as much; but it is known less well by so much."""
-_LEAST_ROUNDS, _MOST_ROUNDS, _SETTLED, _FARTHEST = 3, 8, 0.01, 0.5
-_CLOSELY = 5
-"""Every so many frames that show no face of the head's, faces are sought that are too small to be
-found in the whole picture."""
+_NEW_VIEW_RAD, _NEW_VIEW_LOG_DISTANCE = np.radians(5.0), 0.08
+"""A frame is used if its head is rotated by this much, or nearer or farther by this much in log
+distance, from all that were used: errors of landmarks in similar views are correlated."""
+_SHAPE_COMPONENTS = 24
+"""Identity components, the greatest first, that errors of the landmarks are modelled by."""
+_PERSPECTIVE_RESPONSE = 0.65
+"""The share of a change of perspective that the detector's landmarks show. In rendered pictures
+they show the same share, so the estimate has no bias; but its precision is this much smaller."""
+_MIN_ITERATIONS, _MAX_ITERATIONS, _TOLERANCE, _MAX_STEP = 3, 8, 0.01, 0.5
+_SMALL_FACE_INTERVAL = 5
+"""In every so many frames without a face of the head's, faces are sought that are too small to be
+detected in the whole picture."""
 _FOCAL = CAMERA_SIZE - 1
-_LITTLE = 0.7
+_UNINFORMATIVE = 0.7
+"""The estimate is reported as the prior's if its deviation is more than this share of it."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,7 @@ class FocalEstimate:
     Attributes:
         focal_px: of its upright pictures.
         deviation: of its logarithm; 0.1 is about 10 %.
-        frames_used: how many frames it rests on.
+        frames_used: how many frames it was estimated from.
         note: one line for the user.
     """
 
@@ -58,60 +65,66 @@ class FocalEstimate:
 
 
 class FocalEstimator:
-    """Gathers frames whose heads are seen differently, and weighs what they say together.
+    """Collects frames with different views of the head and solves for their common focal length.
 
-    Unknown in common are the focal length and how far the head's shape is off; in every frame the
-    pose, what the face does, and how far the detector is off there. So a head that holds still
-    says little, however long it does.
+    Common unknowns are the focal length and the error of the head's shape; those of each frame are
+    the pose, the face, and the detector's error there. So a head that holds still determines
+    little, however many frames there are.
 
     Args:
-        starter: of the head.
+        detector: of the head.
+        head: whose uncertainty is the deviation of its shape.
         size: width and height of the video's upright pictures.
-        expected: what is known before; see lens.expected_focal.
+        expected: the prior; see lens.expected_focal.
     """
 
     def __init__(
-        self, starter: Starter, head: Head, size: tuple[int, int], expected: LogFocal
+        self, detector: HeadDetector, head: Head, size: tuple[int, int], expected: LogFocal
     ) -> None:
-        self._starter, self._size, self._expected = starter, size, expected
-        ways = _ways_to_be_off()
-        spread = float(np.sqrt((ways**2).sum(axis=(1, 2)).mean()))
+        self._detector, self._size, self._expected = detector, size, expected
+        components = _shape_components()
+        spread = float(np.sqrt((components**2).sum(axis=(1, 2)).mean()))
         corners = load_generic_head().mesh.triangles[load_generic_head().landmark_triangles]
-        unsure = float(np.median(head.uncertainty_mm[corners]))
-        # Of the shape, and of the detector in a frame.
-        self._off_in_common = ways * (unsure / spread)
-        self._off_in_frame = ways * (np.sqrt(2) * REPEATED_MM / spread)
-        self._seen: list[Observation] = []
-        self._guesses: list[Guess] = []
-        self._others: list[Guess] = []
+        shape_sd = float(np.median(head.uncertainty_mm[corners]))
+        # (478, 3, W) mm at one standard deviation: of the shape, and of the detector in a frame.
+        self._shape_offsets = components * (shape_sd / spread)
+        self._detector_offsets = components * (np.sqrt(2) * LANDMARK_SD_MM / spread)
+        self._observations: list[LandmarkObservation] = []
+        self._estimates: list[PoseAndFace] = []
+        self._mismatches: list[PoseAndFace] = []
 
     @property
     def frames_used(self) -> int:
         """How many frames are kept."""
-        return len(self._seen)
+        return len(self._observations)
 
-    def add(self, face: DetectedFace, is_own: Callable[[Found], bool] = lambda found: True) -> bool:
-        """Keep a face, in px of the upright picture, if no other was seen as it is.
+    def add(
+        self, face: DetectedFace, is_match: Callable[[HeadDetection], bool] = lambda result: True
+    ) -> bool:
+        """Keep a face if no other was seen in a similar view; False if it is not kept.
 
         Args:
-            is_own: whether the face, which is found there, is the head's.
+            face: in px of the upright picture.
+            is_match: whether the face is the head's.
         """
-        if self.frames_used == MOST_FRAMES:
+        if self.frames_used == MAX_FOCAL_FRAMES:
             return False
-        seen = Observation.of(self._starter.marks, face, self._size)
+        observation = LandmarkObservation.from_detection(self._detector.model, face, self._size)
         focal = self._expected.focal_px
         try:
-            guess = fit_face(seen, self._starter.layout, focal, start=seen.start(focal))
+            estimate = fit_face(
+                observation, self._detector.layout, focal, initial=observation.initial_pose(focal)
+            )
         except EstimationError:
             return False
-        if any(_alike(guess, other) for other in (*self._guesses, *self._others)):
+        if any(_same_view(estimate, other) for other in (*self._estimates, *self._mismatches)):
             return False
-        found = self._starter.fit(face, size=self._size, focal_px=focal)
-        if found is None or not is_own(found):
-            self._others.append(guess)
+        result = self._detector.fit(face, size=self._size, focal_px=focal)
+        if result is None or not is_match(result):
+            self._mismatches.append(estimate)
             return False
-        self._seen.append(seen)
-        self._guesses.append(guess)
+        self._observations.append(observation)
+        self._estimates.append(estimate)
         return True
 
     def estimate(self) -> LogFocal:
@@ -120,116 +133,133 @@ class FocalEstimator:
         Raises:
             EstimationError: a landmark comes to lie behind the camera.
         """
-        if not self._seen:
+        if not self._observations:
             return self._expected
-        now, off = self._expected.mean, np.zeros(self._off_in_common.shape[2])
-        guesses, precision = self._guesses, self._expected.precision
-        for done in range(_MOST_ROUNDS):
-            seen = self._corrected(now, guesses)
-            system = self._system(now, off, seen, guesses)
+        log_focal, shape = self._expected.mean, np.zeros(self._shape_offsets.shape[2])
+        estimates, precision = self._estimates, self._expected.precision
+        for done in range(_MAX_ITERATIONS):
+            observations = self._bias_corrected(log_focal, estimates)
+            system = self._system(log_focal, shape, observations, estimates)
             precision = 1 / float(system.covariance()[0][0, 0])
             step = system.solve(0.0)[0]
-            ahead = float(np.clip(step[0], -_FARTHEST, _FARTHEST))
-            now, off = now + ahead, off + step[1:]
-            if abs(ahead) < _SETTLED and done + 1 >= _LEAST_ROUNDS:
+            focal_step = float(np.clip(step[0], -_MAX_STEP, _MAX_STEP))
+            log_focal, shape = log_focal + focal_step, shape + step[1:]
+            if abs(focal_step) < _TOLERANCE and done + 1 >= _MIN_ITERATIONS:
                 break
-            guesses = self._refitted(now, off, seen, guesses, float(np.exp(ahead)))
+            estimates = self._refit(
+                log_focal, shape, observations, estimates, float(np.exp(focal_step))
+            )
         before = self._expected.precision
-        return LogFocal(now, before + _SHOWN**2 * (precision - before))
+        return LogFocal(log_focal, before + _PERSPECTIVE_RESPONSE**2 * (precision - before))
 
-    def _corrected(self, log_focal: float, guesses: Sequence[Guess]) -> list[Observation]:
-        """What was seen, less what the detector errs by when it is shown the guesses.
+    def _bias_corrected(
+        self, log_focal: float, estimates: Sequence[PoseAndFace]
+    ) -> list[LandmarkObservation]:
+        """The observations less the detector's errors in rendered pictures of the estimates.
 
-        Perspective is what it errs about most: it draws all faces as if seen from half a metre or
-        so, and without this they would all seem to be.
+        Its greatest error is in perspective: it places the landmarks of every face as if it were
+        seen from about half a metre, which uncorrected would bias the focal length.
         """
         focal = float(np.exp(log_focal))
         return [
-            self._starter.corrected(seen, guess, self._size, focal)
-            for seen, guess in zip(self._seen, guesses, strict=True)
+            self._detector.bias_corrected(observation, estimate, self._size, focal)
+            for observation, estimate in zip(self._observations, estimates, strict=True)
         ]
 
-    def _refitted(
+    def _refit(
         self,
         log_focal: float,
-        off: Float[Array, " w"],
-        observations: Sequence[Observation],
-        guesses: Sequence[Guess],
-        nearer: float,
-    ) -> list[Guess]:
-        """Pose and face in every frame for another focal length and shape."""
-        scale = np.array([1.0, 1.0, nearer])
+        shape: Float[Array, " w"],
+        observations: Sequence[LandmarkObservation],
+        estimates: Sequence[PoseAndFace],
+        distance_factor: float,
+    ) -> list[PoseAndFace]:
+        """Pose and face in every frame at another focal length and shape."""
+        scale = np.array([1.0, 1.0, distance_factor])
         return [
             fit_face(
-                self._shifted(seen, off),
-                self._starter.layout,
+                self._with_shape(observation, shape),
+                self._detector.layout,
                 float(np.exp(log_focal)),
-                start=replace(guess, t=guess.t * scale),
+                initial=replace(estimate, t=estimate.t * scale),
             )
-            for seen, guess in zip(observations, guesses, strict=True)
+            for observation, estimate in zip(observations, estimates, strict=True)
         ]
 
-    def _shifted(self, seen: Observation, off: Float[Array, " w"]) -> Observation:
-        """The same of a head whose landmarks are off like this."""
-        return replace(seen, places=seen.places + self._off_in_common[seen.kept] @ off)
+    def _with_shape(
+        self, observation: LandmarkObservation, shape: Float[Array, " w"]
+    ) -> LandmarkObservation:
+        """The same on a head with these coefficients of its shape error."""
+        return replace(
+            observation,
+            positions=observation.positions + self._shape_offsets[observation.indices] @ shape,
+        )
 
     def _system(
         self,
         log_focal: float,
-        off: Float[Array, " w"],
-        observations: Sequence[Observation],
-        guesses: Sequence[Guess],
+        shape: Float[Array, " w"],
+        observations: Sequence[LandmarkObservation],
+        estimates: Sequence[PoseAndFace],
     ) -> BlockSystem:
-        """Normal equations: in common log focal length and shape, in each frame the rest."""
-        ways = len(off)
-        common, gradient = np.eye(1 + ways), np.concatenate([[0.0], off])
+        """Normal equations: log focal length and shape are common, the others each frame's."""
+        count = len(shape)
+        common, gradient = np.eye(1 + count), np.concatenate([[0.0], shape])
         common[0, 0] = self._expected.precision
         gradient[0] = self._expected.precision * (log_focal - self._expected.mean)
         blocks, coupling, block_gradients = [], [], []
-        for seen, guess in zip(observations, guesses, strict=True):
-            hessian, slope = self._frame(self._shifted(seen, off), guess, float(np.exp(log_focal)))
-            shared = np.zeros(len(slope), bool)
-            shared[[_FOCAL, *range(len(slope) - ways, len(slope))]] = True
-            common += hessian[np.ix_(shared, shared)]
-            gradient += slope[shared]
-            blocks.append(hessian[np.ix_(~shared, ~shared)])
-            coupling.append(hessian[np.ix_(shared, ~shared)])
-            block_gradients.append(slope[~shared])
+        for observation, estimate in zip(observations, estimates, strict=True):
+            hessian, frame_gradient = self._frame(
+                self._with_shape(observation, shape), estimate, float(np.exp(log_focal))
+            )
+            common_mask = np.zeros(len(frame_gradient), bool)
+            common_mask[[_FOCAL, *range(len(frame_gradient) - count, len(frame_gradient))]] = True
+            common += hessian[np.ix_(common_mask, common_mask)]
+            gradient += frame_gradient[common_mask]
+            blocks.append(hessian[np.ix_(~common_mask, ~common_mask)])
+            coupling.append(hessian[np.ix_(common_mask, ~common_mask)])
+            block_gradients.append(frame_gradient[~common_mask])
         return BlockSystem(
             common, np.stack(blocks), np.stack(coupling), gradient, np.stack(block_gradients)
         )
 
-    def _frame(self, seen: Observation, guess: Guess, focal_px: float) -> tuple[Array, Array]:
-        """Of one frame, over its camera, its face, what is off in it, and in common."""
-        problem = MarkProblem(seen, self._starter.layout, focal_px, near=guess)
-        off_in_frame = self._off_in_frame[seen.kept]
-        moves = [seen.moves, off_in_frame, self._off_in_common[seen.kept]]
-        hessian, gradient = problem.measured(guess).normal_equations(np.concatenate(moves, axis=2))
-        face = slice(CAMERA_SIZE, CAMERA_SIZE + len(guess.face))
-        problem.add_belief(guess.face, hessian[face, face], gradient[face])
-        own = np.arange(face.stop, face.stop + off_in_frame.shape[2])
+    def _frame(
+        self, observation: LandmarkObservation, estimate: PoseAndFace, focal_px: float
+    ) -> tuple[Array, Array]:
+        """Of one frame, over its camera, its face, the detector's error in it, and the shape."""
+        problem = LandmarkProblem(observation, self._detector.layout, focal_px, initial=estimate)
+        detector_offsets = self._detector_offsets[observation.indices]
+        offsets = [observation.offsets, detector_offsets, self._shape_offsets[observation.indices]]
+        hessian, gradient = problem.linearize(estimate).normal_equations(
+            np.concatenate(offsets, axis=2)
+        )
+        face = slice(CAMERA_SIZE, CAMERA_SIZE + len(estimate.face))
+        problem.add_prior(estimate.face, hessian[face, face], gradient[face])
+        own = np.arange(face.stop, face.stop + detector_offsets.shape[2])
         hessian[own, own] += 1
-        # A weight at its bound stays there.
-        held = face.start + np.flatnonzero((guess.face <= 0) | (guess.face >= MOST))
-        hessian[held], hessian[:, held], gradient[held] = 0, 0, 0
-        hessian[held, held] = 1
+        # A weight at its bound is fixed.
+        fixed = face.start + np.flatnonzero((estimate.face <= 0) | (estimate.face >= MAX_WEIGHT))
+        hessian[fixed], hessian[:, fixed], gradient[fixed] = 0, 0, 0
+        hessian[fixed, fixed] = 1
         return hessian, gradient
 
 
 def estimate_focal(
     frames: Iterable[UInt8[Array, "h w 3"]],
-    starter: Starter,
+    detector: HeadDetector,
     head: Head,
     *,
     expected: LogFocal | None = None,
-    is_own: Callable[[UInt8[Array, "h w 3"], Found], bool] = lambda pixels, found: True,
+    is_match: Callable[[UInt8[Array, "h w 3"], HeadDetection], bool] = lambda pixels, result: True,
 ) -> FocalEstimate:
     """The focal length of a video from some of its first frames, every fifth, say.
 
     Args:
-        frames: upright pictures of one size, at most as many as are worth 10 ms each.
-        expected: what is known before; by default lens.expected_focal.
-        is_own: whether a face found in a picture is the head's.
+        frames: upright pictures of one size; each takes some 10 ms.
+        detector: of the head.
+        head: of the person in the video.
+        expected: the prior; by default lens.expected_focal.
+        is_match: whether a face detected in a picture is the head's.
 
     Raises:
         InputError: no frames.
@@ -239,42 +269,42 @@ def estimate_focal(
         if estimator is None:
             size = (pixels.shape[1], pixels.shape[0])
             expected = expected or expected_focal(head, *size)
-            estimator = FocalEstimator(starter, head, size, expected)
-        for face in starter.look(pixels):
-            estimator.add(face, partial(is_own, pixels))
-        if not estimator.frames_used and number % _CLOSELY == 0:
-            for face in starter.look_closely(pixels):
-                estimator.add(face, partial(is_own, pixels))
+            estimator = FocalEstimator(detector, head, size, expected)
+        for face in detector.detect_faces(pixels):
+            estimator.add(face, partial(is_match, pixels))
+        if not estimator.frames_used and number % _SMALL_FACE_INTERVAL == 0:
+            for face in detector.detect_small_faces(pixels):
+                estimator.add(face, partial(is_match, pixels))
     if estimator is None or size is None or expected is None:
         raise InputError("frames", "at least one", "none")
     try:
-        found = estimator.estimate()
+        result = estimator.estimate()
     except EstimationError:
-        found = expected
+        result = expected
     return FocalEstimate(
-        found.focal_px,
-        found.deviation,
+        result.focal_px,
+        result.deviation,
         estimator.frames_used,
-        _note(found, expected, size, estimator.frames_used),
+        _note(result, expected, size, estimator.frames_used),
     )
 
 
-def _note(found: LogFocal, expected: LogFocal, size: tuple[int, int], frames: int) -> str:
-    angle = 2 * np.degrees(np.arctan(max(size) / 2 / found.focal_px))
-    lens = f"focal length {found.focal_px:.0f} px ({angle:.0f} degrees across)"
-    if found.deviation > _LITTLE * expected.deviation:
+def _note(result: LogFocal, expected: LogFocal, size: tuple[int, int], frames: int) -> str:
+    angle = 2 * np.degrees(np.arctan(max(size) / 2 / result.focal_px))
+    lens = f"focal length {result.focal_px:.0f} px ({angle:.0f} degrees across)"
+    if result.deviation > _UNINFORMATIVE * expected.deviation:
         return f"{lens}, mostly as expected: the head moves too little to tell more"
-    return f"{lens}, good to {found.deviation:.0%}, from {frames} frames"
+    return f"{lens}, good to {result.deviation:.0%}, from {frames} frames"
 
 
-def _ways_to_be_off() -> Float[Array, "478 3 w"]:
-    """(478, 3, W) mm: landmarks of heads that differ, each at one standard deviation."""
+def _shape_components() -> Float[Array, "478 3 w"]:
+    """(478, 3, W) mm: identity components at the landmarks, each at one standard deviation."""
     generic = load_generic_head()
-    components = at_landmarks(generic, generic.identity.components[:_WAYS])
+    components = at_landmarks(generic, generic.identity.components[:_SHAPE_COMPONENTS])
     return np.ascontiguousarray(components.transpose(1, 2, 0), np.float64)
 
 
-def _alike(guess: Guess, other: Guess) -> bool:
-    nearer = abs(float(np.log(guess.t[2] / other.t[2])))
-    turned = float(angle_between(guess.R, other.R))
-    return turned < _OTHERWISE_RAD and nearer < _OTHERWISE_NEAR
+def _same_view(estimate: PoseAndFace, other: PoseAndFace) -> bool:
+    distance_change = abs(float(np.log(estimate.t[2] / other.t[2])))
+    rotation = float(angle_between(estimate.R, other.R))
+    return rotation < _NEW_VIEW_RAD and distance_change < _NEW_VIEW_LOG_DISTANCE

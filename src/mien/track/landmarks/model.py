@@ -1,9 +1,9 @@
-"""What a landmark detector means by its landmarks on one head.
+"""Where a landmark detector finds its landmarks on one head.
 
-They lie off the places that they are attached to on the generic head, by 4 to 9 % of the distance
-between the eyes on real heads and in every expression differently; but whether the detector looks
-at a person or at a picture of that person's head makes little difference, 1.2 to 2.6 %. So it is
-shown such pictures once, and what it says of them is what it means.
+On real heads they lie 4 to 9 % of the distance between the eyes from the surface points that the
+generic head assigns to them, in every expression differently. In a photograph of a person and in a
+rendered picture of that person's head the detector finds nearly the same points: they differ by
+1.2 to 2.6 %. So its bias is measured once, in rendered pictures.
 """
 
 from __future__ import annotations
@@ -20,101 +20,113 @@ from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
 from mien.mesh import Mesh
 from mien.rig.rig import Rig
 from mien.rig.state import FACE, FaceState
-from mien.track.landmarks.detector_bias import Meant, Pictures, at_landmarks, landmark_normals
+from mien.track.landmarks.detector_bias import (
+    DetectorBias,
+    DetectorProbe,
+    at_landmarks,
+    landmark_normals,
+)
 from mien.track.state import Layout
 
-REPEATED_MM = 0.8
-"""How far, each axis, a detector finds a landmark in a photograph off where it does in a picture
-of the head that the photograph shows."""
-UNSEEN_MM = 2.5
-"""The same where no such picture tells what it means."""
+LANDMARK_SD_MM = 0.8
+"""Standard deviation, each axis, of a landmark in a photograph from the same one in a rendered
+picture of the head that the photograph shows."""
+UNMEASURED_SD_MM = 2.5
+"""The same where the bias could not be measured."""
 _EXPRESSION_VIEWS = 3
-"""Expressions are shown from fewer sides than the neutral face, and units from the front alone."""
+"""Expressions are rendered from fewer viewpoints than the neutral face, units from one."""
 
 
 @dataclass(frozen=True)
-class Marks:
-    """The detector's landmarks on one head, and how P unknowns of its face move them.
+class LandmarkModel:
+    """The detector's landmarks on one head, linear in P unknowns of its face.
 
     The unknowns are the weights of all expressions but neutral, region after region, then those of
     the units.
 
     Attributes:
-        places: (478, 3) mm, head space, in the neutral face.
-        drift: (3, 478, 3) mm by which they move with each of the numbers of a viewpoint.
-        normals: (478, 3) of its surface there.
-        moves: (P, 478, 3) mm, at weight 1.
-        sigma_mm: (478,) how far off its place each is found, each axis; inf where it has none.
-        scores: (52,) what the detector says of the neutral face's units.
-        score_moves: (P, 52) by which that changes at weight 1.
+        positions: (478, 3) mm, head space, in the neutral face.
+        view_slopes: (3, 478, 3) mm by which they move with each viewpoint coordinate.
+        normals: (478, 3) of the surface there.
+        offsets: (P, 478, 3) mm by which each unknown moves them at 1.
+        sigma_mm: (478,) standard deviations, each axis; inf of landmarks without a surface point.
+        scores: (52,) the detector's of the neutral face.
+        score_offsets: (P, 52) by which each unknown changes them at 1.
     """
 
-    places: Float[Array, "478 3"]
-    drift: Float[Array, "3 478 3"]
+    positions: Float[Array, "478 3"]
+    view_slopes: Float[Array, "3 478 3"]
     normals: Float[Array, "478 3"]
-    moves: Float[Array, "p 478 3"]
+    offsets: Float[Array, "p 478 3"]
     sigma_mm: Float[Array, " 478"]
     scores: Float[Array, " 52"]
-    score_moves: Float[Array, "p 52"]
+    score_offsets: Float[Array, "p 52"]
 
 
-def measure_marks(rig: Rig, mesh: Mesh, layout: Layout, pictures: Pictures) -> Marks:
-    """The landmarks of a head by showing the detector pictures of it, 15 ms each.
+def build_landmark_model(
+    rig: Rig, mesh: Mesh, layout: Layout, probe: DetectorProbe
+) -> LandmarkModel:
+    """The landmarks of a head, measured in rendered pictures of it, 15 ms each.
 
-    Where it finds no face in them, landmarks stay where the generic head has them.
+    Where no face is detected in them, landmarks stay at the generic head's surface points.
 
     Args:
-        rig: poses the head.
-        mesh: the head's own, in its neutral face.
-        pictures: of it.
+        rig: of the head.
+        mesh: the head's, in its neutral face.
+        layout: whose expressions and units are the unknowns.
+        probe: of the head.
 
     Raises:
         InputError: a region, expression or unit that the head has not.
     """
     generic = load_generic_head()
-    neutral = pictures.meant(FaceState())
-    drift = neutral.drift
-    in_front = pictures.meant(FaceState(), 1, drift)
+    neutral = probe.measure_bias(FaceState())
+    view_slopes = neutral.view_slopes
+    frontal = probe.measure_bias(FaceState(), 1, view_slopes)
     expressions = [
-        pictures.meant(FaceState({FACE: {name: 1.0}}), _EXPRESSION_VIEWS, drift)
+        probe.measure_bias(FaceState({FACE: {name: 1.0}}), _EXPRESSION_VIEWS, view_slopes)
         for name in layout.expressions[1:]
     ]
-    units = [pictures.meant(FaceState(units={name: 1.0}), 1, drift) for name in layout.units]
+    units = [
+        probe.measure_bias(FaceState(units={name: 1.0}), 1, view_slopes) for name in layout.units
+    ]
     masks = np.array([rig.mask(region) for region in layout.regions])
-    nearby, concerned = at_landmarks(generic, masks.T).T, _of_scores(generic, masks)
-    changes = [meant.change_from(neutral) for meant in expressions]
-    moves = [near[:, None] * move for near in nearby for move, _ in changes]
-    score_moves = [share * score for share in concerned for _, score in changes]
-    for meant in units:
-        move, score = meant.change_from(in_front)
-        moves.append(move)
-        score_moves.append(score)
-    return Marks(
-        places=frozen(neutral.attached + neutral.beside),
-        drift=frozen(drift),
+    region_weights = at_landmarks(generic, masks.T).T
+    score_shares = _region_shares_of_scores(generic, masks)
+    changes = [bias.change_from(neutral) for bias in expressions]
+    offsets = [weight[:, None] * offset for weight in region_weights for offset, _ in changes]
+    score_offsets = [share * score for share in score_shares for _, score in changes]
+    for bias in units:
+        offset, score = bias.change_from(frontal)
+        offsets.append(offset)
+        score_offsets.append(score)
+    return LandmarkModel(
+        positions=frozen(neutral.positions + neutral.offsets),
+        view_slopes=frozen(view_slopes),
         normals=frozen(landmark_normals(generic, mesh)),
-        moves=frozen(np.reshape(moves, (-1, LANDMARK_COUNT, 3))),
+        offsets=frozen(np.reshape(offsets, (-1, LANDMARK_COUNT, 3))),
         sigma_mm=frozen(_sigma(generic, [neutral, *expressions])),
         scores=frozen(neutral.scores),
-        score_moves=frozen(np.reshape(score_moves, (-1, len(BLENDSHAPE_NAMES)))),
+        score_offsets=frozen(np.reshape(score_offsets, (-1, len(BLENDSHAPE_NAMES)))),
     )
 
 
-def _of_scores(generic: GenericHead, masks: Float[Array, "r v"]) -> Float[Array, "r 52"]:
-    """(R, 52) the share of each scored unit's movement that lies in each region."""
+def _region_shares_of_scores(
+    generic: GenericHead, masks: Float[Array, "r v"]
+) -> Float[Array, "r 52"]:
+    """(R, 52) the share of each scored unit's motion that lies in each region."""
     moved = np.linalg.norm(generic.unit_offsets, axis=2)
-    by_unit = masks @ moved.T / np.maximum(moved.sum(axis=1), 1e-9)
-    column = {name: by_unit[:, index] for index, name in enumerate(generic.unit_names)}
+    shares = masks @ moved.T / np.maximum(moved.sum(axis=1), 1e-9)
+    column = {name: shares[:, index] for index, name in enumerate(generic.unit_names)}
     return np.stack([column.get(name, np.zeros(len(masks))) for name in BLENDSHAPE_NAMES], axis=1)
 
 
-def _sigma(generic: GenericHead, meants: Sequence[Meant]) -> Float[Array, " 478"]:
-    """(478,) mm: how far landmarks stray from view to view, and from picture to photograph."""
-    misses = np.concatenate([meant.misses for meant in meants if meant.seen] or [_NOTHING])
-    seen = np.isfinite(misses[..., 0])
-    strayed = np.nansum(misses**2, axis=(0, 2)) / np.maximum(2 * seen.sum(axis=0), 1)
-    sigma = np.where(seen.any(axis=0), np.sqrt(REPEATED_MM**2 + strayed), UNSEEN_MM)
+def _sigma(generic: GenericHead, biases: Sequence[DetectorBias]) -> Float[Array, " 478"]:
+    """(478,) mm: deviation from view to view, and from rendered picture to photograph."""
+    residuals = np.concatenate(
+        [bias.residuals for bias in biases if bias.detected] or [np.zeros((0, LANDMARK_COUNT, 2))]
+    )
+    measured = np.isfinite(residuals[..., 0])
+    variance = np.nansum(residuals**2, axis=(0, 2)) / np.maximum(2 * measured.sum(axis=0), 1)
+    sigma = np.where(measured.any(axis=0), np.sqrt(LANDMARK_SD_MM**2 + variance), UNMEASURED_SD_MM)
     return np.where(generic.landmark_attached, sigma, np.inf)
-
-
-_NOTHING = np.zeros((0, LANDMARK_COUNT, 2))

@@ -53,7 +53,7 @@ class FrameFitOptions:
         last: the same for the last time.
         numeric: unknowns whose Jacobian is taken by central differences: "pose", a region, a unit,
             "gaze". All are analytic by default: as good, and a tenth of the time
-            (docs/notes/tracking.md).
+            (docs/notes/tracking-experiments.md).
         tolerance: relative decrease of the cost at which the last ends; the others at ten times it.
     """
 

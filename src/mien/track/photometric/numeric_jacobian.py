@@ -2,7 +2,7 @@
 
 It includes what the analytic Jacobian leaves out: occlusion, the effect of a moving outline on the
 filter and, on request, contacts and shadows. It takes two more drawings for every unknown
-(docs/notes/tracking.md compares both).
+(docs/notes/tracking-experiments.md compares both).
 """
 
 from __future__ import annotations

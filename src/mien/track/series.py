@@ -1,4 +1,4 @@
-"""A track's numbers as arrays, and how far they are from the truth."""
+"""A track's numbers as arrays, and their errors against a reference."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mien.animate.from_track import FACING
 from mien.arrays import Array, Bool, Float, Int
+from mien.camera import FRONTAL, head_angles_deg
 from mien.numeric.rotation import angle_between
-from mien.report.page import head_angles_deg
 from mien.track.state import Track
 
 
@@ -18,16 +17,16 @@ class Series:
     """A track's numbers, NaN where the face was lost.
 
     Attributes:
-        numbers: (N,) of the frames.
+        numbers: (N,) of the frames, counted from 0.
         times: (N,) seconds.
         status: (N,).
-        rms: (N,) as TrackedFrame's.
-        seen: (N,) as TrackedFrame's.
+        rms: (N,) grey levels, as TrackedFrame.rms.
+        seen: (N,) shares from 0 to 1, as TrackedFrame.seen.
         rotations: (N, 3, 3) R_cam_head.
         angles: (N, 3) degrees of yaw, pitch and roll.
         translations: (N, 3) mm.
-        values: (N,) by channel.
-        deviations: (N,) by channel.
+        values: (N,) by channel of the layout.
+        deviations: (N,) standard deviations by channel.
     """
 
     numbers: Int[Array, " n"]
@@ -43,7 +42,7 @@ class Series:
 
     @property
     def lost(self) -> Bool[Array, " n"]:
-        """(N,)."""
+        """(N,) where the face was lost."""
         return np.array([status == "lost" for status in self.status], bool)
 
 
@@ -53,18 +52,18 @@ def series_of(track: Track) -> Series:
     shapes = ((3, 3), (3,), (3,), (len(channels),))
     arrays = [np.full((len(frames), *shape), np.nan) for shape in (*shapes, shapes[-1])]
     rotations, angles, translations, values, deviations = arrays
-    for row, found in enumerate(frames):
-        if found.state is not None:
-            rotations[row], translations[row] = found.state.R_cam_head, found.state.t_cam_head
-            angles[row] = head_angles_deg(track.camera(found.state))
-            values[row], deviations[row] = found.state.values, found.deviations
-    lost = np.array([found.state is None for found in frames], bool)
+    for row, frame in enumerate(frames):
+        if frame.state is not None:
+            rotations[row], translations[row] = frame.state.R_cam_head, frame.state.t_cam_head
+            angles[row] = head_angles_deg(track.camera(frame.state))
+            values[row], deviations[row] = frame.state.values, frame.deviations
+    lost = np.array([frame.state is None for frame in frames], bool)
     return Series(
-        numbers=np.array([found.frame for found in frames], np.int64),
-        times=np.array([found.time for found in frames]),
-        status=tuple(found.status for found in frames),
-        rms=np.array([found.rms for found in frames]),
-        seen=np.where(lost, np.nan, [found.seen for found in frames]),
+        numbers=np.array([frame.frame for frame in frames], np.int64),
+        times=np.array([frame.time for frame in frames]),
+        status=tuple(frame.status for frame in frames),
+        rms=np.array([frame.rms for frame in frames]),
+        seen=np.where(lost, np.nan, [frame.seen for frame in frames]),
         rotations=rotations,
         angles=angles,
         translations=translations,
@@ -74,16 +73,16 @@ def series_of(track: Track) -> Series:
 
 
 def truth_for(track: Track, reference: Track) -> Series:
-    """The reference's numbers for the track's frames, by their numbers; NaN where it has none."""
-    known = {found.frame: found for found in reference.frames}
+    """The reference as arrays over the track's frames; NaN where it has no frame of that number."""
+    known = {frame.frame: frame for frame in reference.frames}
     frames = (
-        known.get(found.frame, replace(found, status="lost", state=None)) for found in track.frames
+        known.get(frame.frame, replace(frame, status="lost", state=None)) for frame in track.frames
     )
     return series_of(replace(reference, frames=tuple(frames)))
 
 
 def rotation_errors(series: Series, truth: Series) -> Float[Array, " n"]:
-    """(N,) degrees between the rotations."""
+    """(N,) angles between the rotations, degrees."""
     both = np.isfinite(series.rotations + truth.rotations).all(axis=(1, 2))
     errors = np.full(len(both), np.nan)
     errors[both] = np.degrees(angle_between(series.rotations[both], truth.rotations[both]))
@@ -91,18 +90,18 @@ def rotation_errors(series: Series, truth: Series) -> Float[Array, " n"]:
 
 
 def translation_errors(series: Series, truth: Series) -> Float[Array, " n"]:
-    """(N,) distance between the translations, percent of the true distance."""
-    apart = np.linalg.norm(series.translations - truth.translations, axis=1)
-    return 100 * apart / np.linalg.norm(truth.translations, axis=1)
+    """(N,) distances between the translations, percent of the true distance."""
+    distances = np.linalg.norm(series.translations - truth.translations, axis=1)
+    return 100 * distances / np.linalg.norm(truth.translations, axis=1)
 
 
 def quaternions(series: Series) -> Float[Array, "n 4"]:
-    """(N, 4) x, y, z, w >= 0 of the rotation out of the camera's view."""
+    """(N, 4) x, y, z and w >= 0 of the rotations relative to a head that faces the camera."""
     from scipy.spatial.transform import Rotation
 
     result = np.full((len(series.rotations), 4), np.nan)
-    found = ~series.lost
-    if found.any():
-        turned = Rotation.from_matrix(series.rotations[found] @ FACING.T)
-        result[found] = turned.as_quat(canonical=True)
+    known = ~series.lost
+    if known.any():
+        relative = Rotation.from_matrix(series.rotations[known] @ FRONTAL.T)
+        result[known] = relative.as_quat(canonical=True)
     return result

@@ -8,7 +8,7 @@ from mien.camera import Camera
 from mien.capture.source import CapturedView
 from mien.numeric.raster.rasterizer import rasterize
 from mien.reconstruction.dense.crops import visible_mesh
-from mien.reconstruction.dense.surface_tracks import NO_TRACKS, Tracks, find_tracks
+from mien.reconstruction.dense.tracks import NO_TRACKS, Tracks, find_tracks
 
 Photos = list[tuple[CapturedView, Camera]]
 
@@ -18,16 +18,16 @@ def tracks(ann: Person, photos: Photos) -> Tracks:
     return tracked(photos, ann.vertices)
 
 
-def tracked(photos: Photos, vertices: np.ndarray, places: int = 600) -> Tracks:
+def tracked(photos: Photos, vertices: np.ndarray, points: int = 600) -> Tracks:
     views, cameras = zip(*photos, strict=True)
     mesh = visible_mesh(GENERIC, vertices)
-    return find_tracks(views, cameras, mesh, mm_per_px=1.0, places=places)
+    return find_tracks(views, cameras, mesh, mm_per_px=1.0, points=points)
 
 
 def misses_px(tracks: Tracks, photos: Photos, true_places: np.ndarray) -> np.ndarray:
     """(M,) px between observations and the true projections."""
     projected = np.stack([camera.project(true_places) for _, camera in photos])
-    off: np.ndarray = projected[tracks.photo, tracks.place] - tracks.image_points
+    off: np.ndarray = projected[tracks.photo, tracks.point] - tracks.image_points
     return np.hypot(*off.T)
 
 
@@ -40,7 +40,7 @@ def test_places_of_the_true_head_are_seen_where_they_are(
 
 
 def test_a_wrong_head_does_not_mislead(ann: Person, photos: Photos) -> None:
-    """The generic head is up to 8 mm off hers: a place is what its reference photo shows there."""
+    """The generic head is up to 8 mm off hers: a point is what its reference photo shows there."""
     tracks = tracked(photos, GENERIC.mesh.vertices)
     shown = visible_mesh(GENERIC, ann.vertices)
     true_places = np.zeros((len(tracks.corners), 3))
@@ -49,18 +49,18 @@ def test_a_wrong_head_does_not_mislead(ann: Person, photos: Photos) -> None:
         raster = rasterize(
             camera.project(shown.vertices), depth, shown.triangles, camera.width, camera.height
         )
-        own = (tracks.photo == k) & (tracks.reference[tracks.place] == k)
+        own = (tracks.photo == k) & (tracks.reference[tracks.point] == k)
         pixels = tracks.image_points[own]
         seen = raster.depth[np.floor(pixels[:, 1]).astype(int), np.floor(pixels[:, 0]).astype(int)]
-        at = tracks.place[own]
+        at = tracks.point[own]
         depths = np.where(np.isfinite(seen), seen, 1).astype(float)
         true_places[at] = camera.unproject(pixels, depths)
     assert np.median(misses_px(tracks, photos, true_places)) < 0.2
 
 
 def test_each_place_is_seen_by_its_reference_and_another(tracks: Tracks) -> None:
-    assert (np.bincount(tracks.place, minlength=len(tracks.corners)) >= 2).all()
-    seen = set(zip(tracks.photo.tolist(), tracks.place.tolist(), strict=True))
+    assert (np.bincount(tracks.point, minlength=len(tracks.corners)) >= 2).all()
+    seen = set(zip(tracks.photo.tolist(), tracks.point.tolist(), strict=True))
     assert len(seen) == len(tracks.photo)
     assert all((photo, n) in seen for n, photo in enumerate(tracks.reference.tolist()))
     np.testing.assert_allclose(tracks.barycentrics.sum(axis=1), 1, atol=1e-5)
@@ -71,10 +71,10 @@ def test_no_more_places_than_asked_for_and_crowding_says_how_dense(
     ann: Person, photos: Photos, tracks: Tracks
 ) -> None:
     assert len(tracks.corners) <= 600
-    dense = tracked(photos, ann.vertices, places=6000)
+    dense = tracked(photos, ann.vertices, points=6000)
     assert len(dense.corners) > 3 * len(tracks.corners)
-    assert (tracks.crowding >= 1).all()
-    assert dense.crowding.mean() > 2 * tracks.crowding.mean()
+    assert (tracks.overlap >= 1).all()
+    assert dense.overlap.mean() > 2 * tracks.overlap.mean()
 
 
 def test_photos_without_a_pattern_share_nothing(photos: Photos) -> None:

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mien.animate.from_track import FACING
+from mien.camera import FRONTAL, head_angles_deg
 from mien.numeric.rotation import rotation_from_vector
-from mien.report.page import head_angles_deg
-from mien.report.track.series import (
+from mien.track.series import (
     quaternions,
     rotation_errors,
     series_of,
@@ -80,8 +79,8 @@ def test_errors_of_a_known_size(rng: np.random.Generator) -> None:
 def test_a_head_that_faces_the_camera_is_the_quaternion_that_turns_nothing(
     rng: np.random.Generator,
 ) -> None:
-    facing = replace(random_state(rng), R_cam_head=FACING)
-    nodding = replace(facing, R_cam_head=rotation_from_vector(np.array([0.4, 0, 0])) @ FACING)
+    facing = replace(random_state(rng), R_cam_head=FRONTAL)
+    nodding = replace(facing, R_cam_head=rotation_from_vector(np.array([0.4, 0, 0])) @ FRONTAL)
     found = quaternions(series_of(track_of([facing, nodding, None], rng)))
     expected = [[0, 0, 0, 1], [np.sin(0.2), 0, 0, np.cos(0.2)], [np.nan] * 4]
     np.testing.assert_allclose(found, expected, atol=1e-12)

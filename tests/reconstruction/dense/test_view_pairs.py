@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from marbled import at
-from mien.reconstruction.dense.neighbours import choose_pairs
+from mien.reconstruction.dense.view_pairs import choose_pairs
 
 
 def test_one_and_two_photos() -> None:

@@ -13,10 +13,10 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
-from mien.reconstruction.dense.eyes import seat_eyes
+from mien.reconstruction.dense.eyeballs import fit_eyeballs
 from mien.reconstruction.features import EDGE_SIGMA_MM, Features
 from mien.reconstruction.observations import SurfaceObservations
-from mien.reconstruction.shape.skin import move_skin
+from mien.reconstruction.shape.skin import deform_skin
 
 EDGE_MM = 1.0
 """How far a landmark on a visible edge lies off it, seen squarely."""
@@ -24,7 +24,7 @@ ACROSS_SD_MM = 1.0
 """How far the surface itself may give way where several photos have measured it."""
 
 
-def guide_features(
+def align_features(
     vertices: Float[Array, "v 3"],
     features: Features,
     cameras: Sequence[Camera],
@@ -38,10 +38,11 @@ def guide_features(
         vertices: (V, 3) mm.
         features: of K photos.
         cameras: of K photos.
+        generic: the generic head.
         measured: the surface is known from several photos and stays where it is; else what one
             photo shows moves the head across it.
     """
-    photo, column = np.nonzero(features.seen & features.on_edges)
+    photo, column = np.nonzero(features.observed & features.on_edges)
     if not len(photo):
         return vertices
     observations = SurfaceObservations(
@@ -54,5 +55,5 @@ def guide_features(
     )
     held = generic.regions["scalp"]
     across = ACROSS_SD_MM if measured else None
-    moved = move_skin(vertices, observations, cameras, generic, held=held, across_sd_mm=across)
-    return seat_eyes(moved, generic)
+    moved = deform_skin(vertices, observations, cameras, generic, held=held, across_sd_mm=across)
+    return fit_eyeballs(moved, generic)

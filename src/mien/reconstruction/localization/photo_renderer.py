@@ -1,4 +1,4 @@
-"""What some photos with known cameras tell of a head's colours, seen from anywhere."""
+"""A head rendered from any side with the colours of photos whose cameras are known."""
 
 from __future__ import annotations
 
@@ -25,33 +25,30 @@ _JUMP_MM, _CLEAR_MM = 6.0, 6.0
 """Depth that changes more from one pixel to the next is an edge. Near one a photo counts less: a
 small error of the shape puts there what is behind."""
 _BEHIND_MM = 4.0
-_LEAST_FACING = 0.1
-_LEAST_WEIGHT = 1e-3
+_MIN_FACING = 0.1
+_MIN_WEIGHT = 1e-3
 _UNKNOWN_GREY = 110
 _FAR_MM = 1e6
 
 
 @dataclass(frozen=True)
-class Painting:
-    """The head as a camera would show it, as far as the photos tell.
+class PhotoRendering:
+    """The head as a camera would show it, where the photos show it.
 
     Attributes:
         grey: (H, W) uint8.
-        known: (H, W) where some photo tells.
-        places: (H, W, 3) mm of the surface behind each pixel, head space; NaN beside the head.
+        visible: (H, W) where some photo shows it.
+        points: (H, W, 3) mm of the surface behind each pixel, head space; NaN beside the head.
     """
 
     grey: UInt8[Array, "h w"]
-    known: Bool[Array, "h w"]
-    places: Float[Array, "h w 3"]
+    visible: Bool[Array, "h w"]
+    points: Float[Array, "h w 3"]
 
 
 @dataclass(frozen=True)
-class _Known:
-    """A reduced photo with its camera, the depth of its pixels, and how far (0 to 1) they are from
-
-    an edge.
-    """
+class _PreparedPhoto:
+    """A reduced photo, its camera, and depth and clearance of edges (0 to 1) by pixel."""
 
     grey: Float[Array, "h w"]
     camera: Camera
@@ -59,8 +56,8 @@ class _Known:
     clear: Float[Array, "h w"]
 
 
-class Gallery:
-    """Photos with known cameras, made ready to paint the head that they show.
+class PhotoRenderer:
+    """Photos with known cameras, prepared to render the head that they show.
 
     Attributes:
         mesh: what a photo shows of the head: no hair cap, no lashes, no mouth's inside.
@@ -80,25 +77,25 @@ class Gallery:
         self._normals = self.mesh.vertex_normals()
         self._photos = [_prepared(view, camera, self.mesh) for view, camera in photos]
 
-    def paint(self, camera: Camera) -> Painting:
+    def render(self, camera: Camera) -> PhotoRendering:
         """What this camera would see."""
         raster = _rasterized(self.mesh, camera)
         seen = raster.mask
         pixels = np.argwhere(seen)[:, ::-1] + 0.5
-        places = np.full((*seen.shape, 3), np.nan)
-        places[seen] = camera.unproject(pixels, raster.depth[seen].astype(np.float64))
+        points = np.full((*seen.shape, 3), np.nan)
+        points[seen] = camera.unproject(pixels, raster.depth[seen].astype(np.float64))
         normals = interpolate(raster, self.mesh.triangles, self._normals)[seen]
         best, weights = np.zeros((2, len(pixels)), np.float32)
         for photo in self._nearest(camera):
-            grey, weight = _told_by(photo, places[seen], normals)
-            missing = weights <= _LEAST_WEIGHT
+            grey, weight = _sample_photo(photo, points[seen], normals)
+            missing = weights <= _MIN_WEIGHT
             best[missing], weights[missing] = grey[missing], weight[missing]
-        known, image = np.zeros(seen.shape, bool), np.full(seen.shape, _UNKNOWN_GREY, np.uint8)
-        known[seen] = told = weights > _LEAST_WEIGHT
-        image[known] = np.rint(best[told])
-        return Painting(image, known, places)
+        visible, image = np.zeros(seen.shape, bool), np.full(seen.shape, _UNKNOWN_GREY, np.uint8)
+        visible[seen] = sampled = weights > _MIN_WEIGHT
+        image[visible] = np.rint(best[sampled])
+        return PhotoRendering(image, visible, points)
 
-    def _nearest(self, camera: Camera) -> list[_Known]:
+    def _nearest(self, camera: Camera) -> list[_PreparedPhoto]:
         """The photos taken from nearly the same side."""
 
         def side(seen_from: Camera) -> Float[Array, " 3"]:
@@ -145,7 +142,7 @@ def _rasterized(mesh: Mesh, camera: Camera) -> Raster:
     return rasterize(pixels, depth, mesh.triangles, camera.width, camera.height)
 
 
-def _prepared(view: CapturedView, camera: Camera, mesh: Mesh) -> _Known:
+def _prepared(view: CapturedView, camera: Camera, mesh: Mesh) -> _PreparedPhoto:
     import cv2
 
     grey = reduced(view.photo.pixels, PX_PER_MM / px_per_mm(camera))
@@ -156,24 +153,24 @@ def _prepared(view: CapturedView, camera: Camera, mesh: Mesh) -> _Known:
     smooth = raster.mask & (cv2.dilate(depth, kernel) - cv2.erode(depth, kernel) < _JUMP_MM)
     from_edge = cv2.distanceTransform(smooth.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     clear = np.minimum(from_edge / (_CLEAR_MM * px_per_mm(small)), 1)
-    return _Known(grey.astype(np.float32), small, depth, clear)
+    return _PreparedPhoto(grey.astype(np.float32), small, depth, clear)
 
 
-def _told_by(
-    photo: _Known, places: Float[Array, "n 3"], normals: Float[Array, "n 3"]
+def _sample_photo(
+    photo: _PreparedPhoto, points: Float[Array, "n 3"], normals: Float[Array, "n 3"]
 ) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
-    """What a photo shows at places of the surface, and how much that is worth."""
+    """What a photo shows at points of the surface, and how much that is worth."""
     camera = photo.camera
-    depth = camera.to_camera(places)[:, 2]
+    depth = camera.to_camera(points)[:, 2]
     with np.errstate(divide="ignore", invalid="ignore"):
-        pixels = camera.project(places)
+        pixels = camera.project(points)
     size = np.array([camera.width, camera.height])
     inside = (depth > 0) & ((pixels > 1) & (pixels < size - 1)).all(axis=1)
     pixels[~inside] = 0
     columns, rows = pixels.astype(np.int64).T
     visible = inside & (np.abs(photo.depth[rows, columns] - depth) < _BEHIND_MM)
-    towards = camera.center - places
+    towards = camera.center - points
     lengths = np.linalg.norm(towards, axis=1) * np.linalg.norm(normals, axis=1)
     facing = (towards * normals).sum(axis=1) / np.maximum(lengths, 1e-9)
-    weight = np.where(visible & (facing > _LEAST_FACING), facing**3, 0) * photo.clear[rows, columns]
+    weight = np.where(visible & (facing > _MIN_FACING), facing**3, 0) * photo.clear[rows, columns]
     return sample_bilinear(photo.grey[..., None], pixels)[:, 0], weight.astype(np.float32)

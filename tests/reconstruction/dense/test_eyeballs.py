@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from marbled import GENERIC
-from mien.reconstruction.dense.eyes import seat_eyes
+from mien.reconstruction.dense.eyeballs import fit_eyeballs
 
 VERTICES = GENERIC.mesh.vertices
 BALL = np.unique(GENERIC.mesh.triangles[GENERIC.mesh.triangles_of("left_eyeball")])
@@ -19,14 +19,14 @@ def inside_mm(vertices: np.ndarray) -> float:
 
 
 def test_a_head_whose_eyes_sit_well_is_hardly_changed() -> None:
-    seated = seat_eyes(VERTICES, GENERIC)
+    seated = fit_eyeballs(VERTICES, GENERIC)
     assert np.abs(seated[BALL] - VERTICES[BALL]).max() < 0.5
 
 
 def test_a_ball_that_stands_out_goes_back() -> None:
     out = VERTICES.copy()
     out[BALL] += [0.5, 0.0, 2.5]
-    seated = seat_eyes(out, GENERIC)
+    seated = fit_eyeballs(out, GENERIC)
     away = np.linalg.norm((seated - VERTICES)[BALL].mean(axis=0))
     assert away < 0.5 * np.linalg.norm([0.5, 0.0, 2.5])
     assert inside_mm(seated) < max(inside_mm(VERTICES), 0.1) + 0.3
@@ -43,7 +43,7 @@ def test_lids_farther_apart_have_a_larger_ball_between_them() -> None:
     wide = VERTICES.copy()
     near = SKIN[np.linalg.norm(VERTICES[SKIN] - centre, axis=1) < 25]
     wide[near] = centre + 1.1 * (VERTICES[near] - centre)
-    seated = seat_eyes(wide, GENERIC)
+    seated = fit_eyeballs(wide, GENERIC)
     grown = np.linalg.norm(seated[BALL] - seated[BALL].mean(axis=0)) / np.linalg.norm(
         VERTICES[BALL] - centre
     )
@@ -56,4 +56,4 @@ def test_lids_that_sink_in_are_lifted_out() -> None:
     gap = np.linalg.norm(VERTICES - centre, axis=1)
     lids = SKIN[(gap[SKIN] < 20) & (VERTICES[SKIN, 2] > centre[2] + 5)]
     sunk[lids[::3], 2] -= 1.5
-    assert inside_mm(seat_eyes(sunk, GENERIC)) < inside_mm(sunk)
+    assert inside_mm(fit_eyeballs(sunk, GENERIC)) < inside_mm(sunk)

@@ -8,9 +8,9 @@ import pytest
 from expressive import FACE, NEUTRAL, SKIN, bump, features_of
 from marbled import GENERIC, at
 from mien.arrays import Array
-from mien.reconstruction.dense.eyes import seat_eyes
+from mien.reconstruction.dense.eyeballs import fit_eyeballs
 from mien.reconstruction.features import Features, gather_features
-from mien.reconstruction.shape.feature_guide import guide_features
+from mien.reconstruction.shape.feature_alignment import align_features
 from people import camera, photographed
 
 CAMERAS = [at(-20, 4), at(0), at(20, -4)]
@@ -45,7 +45,7 @@ def off_mm(vertices: Array, features: Features = FEATURES) -> Array:
 
 def test_features_come_back_to_their_landmarks() -> None:
     start = slid(2.5)
-    guided = guide_features(start, FEATURES, CAMERAS, GENERIC, measured=False)
+    guided = align_features(start, FEATURES, CAMERAS, GENERIC, measured=False)
     assert np.median(off_mm(start)) > 1.4
     assert np.median(off_mm(guided)) < 0.5
     assert np.percentile(off_mm(guided), 95) < 0.4 * np.percentile(off_mm(start), 95)
@@ -55,7 +55,7 @@ def test_features_come_back_to_their_landmarks() -> None:
 
 def test_one_photo_brings_them_back_as_far_as_it_tells() -> None:
     features = features_of(NEUTRAL, CAMERAS[1:2])
-    guided = guide_features(slid(2.5), features, CAMERAS[1:2], GENERIC, measured=False)
+    guided = align_features(slid(2.5), features, CAMERAS[1:2], GENERIC, measured=False)
     seen = CAMERAS[1].project(features.on(guided)) - CAMERAS[1].project(features.on(NEUTRAL))
     px_per_mm = CAMERAS[1].focal_px / CAMERAS[1].t_cam_head[2]
     assert np.median(np.linalg.norm(seen, axis=1)[features.on_edges]) < 0.5 * px_per_mm
@@ -64,7 +64,7 @@ def test_one_photo_brings_them_back_as_far_as_it_tells() -> None:
 @pytest.mark.parametrize("mm", [1.0, 2.5])
 def test_a_measured_surface_keeps_its_place(mm: float) -> None:
     start = slid(mm)
-    guided = guide_features(start, FEATURES, CAMERAS, GENERIC, measured=True)
+    guided = align_features(start, FEATURES, CAMERAS, GENERIC, measured=True)
     moves = guided - start
     normals = GENERIC.mesh.with_vertices(start).vertex_normals()
     across = np.abs((moves * normals).sum(axis=1))[FACE]
@@ -75,8 +75,8 @@ def test_a_measured_surface_keeps_its_place(mm: float) -> None:
 
 @pytest.mark.parametrize("measured", [False, True])
 def test_a_head_that_is_right_stays_with_its_eyes_seated(measured: bool) -> None:
-    guided = guide_features(NEUTRAL, FEATURES, CAMERAS, GENERIC, measured=measured)
-    np.testing.assert_allclose(guided, seat_eyes(NEUTRAL, GENERIC), atol=1e-9)
+    guided = align_features(NEUTRAL, FEATURES, CAMERAS, GENERIC, measured=measured)
+    np.testing.assert_allclose(guided, fit_eyeballs(NEUTRAL, GENERIC), atol=1e-9)
 
 
 def test_landmarks_on_plain_skin_guide_nothing() -> None:
@@ -90,19 +90,19 @@ def test_landmarks_on_plain_skin_guide_nothing() -> None:
         FEATURES.sigma_mm,
         FEATURES.by_hand,
     )
-    guided = guide_features(NEUTRAL, wrong, CAMERAS, GENERIC, measured=False)
-    np.testing.assert_allclose(guided, seat_eyes(NEUTRAL, GENERIC), atol=1e-9)
+    guided = align_features(NEUTRAL, wrong, CAMERAS, GENERIC, measured=False)
+    np.testing.assert_allclose(guided, fit_eyeballs(NEUTRAL, GENERIC), atol=1e-9)
 
 
 def test_without_landmarks_nothing_moves() -> None:
     marked = gather_features([photographed(NEUTRAL, camera(0))], GENERIC)
-    guided = guide_features(NEUTRAL, marked, [camera(0)], GENERIC, measured=False)
+    guided = align_features(NEUTRAL, marked, [camera(0)], GENERIC, measured=False)
     np.testing.assert_array_equal(guided, NEUTRAL)
 
 
 def test_hair_is_held() -> None:
     lifted = NEUTRAL + np.array([0, 4, 0])
     features = features_of(lifted, CAMERAS)
-    guided = guide_features(NEUTRAL, features, CAMERAS, GENERIC, measured=False)
+    guided = align_features(NEUTRAL, features, CAMERAS, GENERIC, measured=False)
     scalp = SKIN[GENERIC.regions["scalp"][SKIN] > 0.99]
     assert np.linalg.norm(guided - NEUTRAL, axis=1)[scalp].max() < 0.5
