@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from mien.cli.live_line import live_line, status_text, summary_text
-from mien.pipelines.tracking.live_tracker import LiveStatus, LiveSummary
+from mien.pipelines.tracking.live_loop import LiveStatus, LiveSummary
 
 STATUS = LiveStatus(120, "reacquired", 29.84, 0.0412, 3)
 
 
-def test_what_it_says() -> None:
+def test_texts_of_status_and_summary() -> None:
     expected = "frame 120 | 29.8 frames/s | 41 ms | reacquired | 3 dropped | Ctrl-C stops"
     assert status_text(STATUS) == expected
     summary = LiveSummary(300, 4, 3, 10.0, 29.9, 0.0412)

@@ -15,9 +15,9 @@ from mien.arrays import Array
 from mien.io.head.head_folder import load_head
 from mien.io.tracks.track_csv import load_track
 from mien.pipelines.track import Tracked
-from mien.pipelines.tracking.live_tracker import LiveSummary
+from mien.pipelines.tracking.live_loop import LiveSummary
 from mien.pipelines.tracking.outputs import TrackFiles
-from mien.pipelines.tracking.ready_head import ReadyHead
+from mien.pipelines.tracking.prepared_head import PreparedHead
 from mien.render.picture import HeadRenderer
 from mien.rig.state import FaceState
 from mien.track.state import TrackedFrame
@@ -55,7 +55,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
         counts = {"ok": 443, "reacquired": 2, "lost": 3}
         return Tracked(448, counts, 0, 31.24, 6.12, 800.0, ("a note",))
 
-    def live(*arguments: Any, tell: object, **options: Any) -> LiveSummary:
+    def live(*arguments: Any, on_status: object, **options: Any) -> LiveSummary:
         calls.append((*arguments, options))
         return LiveSummary(300, 4, 3, 10.0, 29.9, 0.0412, ("another note",))
 
@@ -75,7 +75,7 @@ def test_a_video_and_its_table(mien: Mien, asked: list[tuple[Any, ...]]) -> None
     assert ran.err == "note: a note\n"
 
 
-def test_all_that_can_be_said(mien: Mien, asked: list[tuple[Any, ...]]) -> None:
+def test_all_options(mien: Mien, asked: list[tuple[Any, ...]]) -> None:
     places = ("--overlay", "o.mp4", "--plots", "p", "--live-link", "l.csv", "--openface", "f.csv")
     how = ("--lens", "28mm", "--smooth", "0.1", "--resume")
     mien("track", "a.mp4", *HEAD, "-o", "t.csv", *places, *how)
@@ -106,7 +106,7 @@ def test_the_json_holds_everything(mien: Mien, asked: list[tuple[Any, ...]]) -> 
         (("12", "--stream", "vmc://", "--stream", "livelink://a:1"), ["vmc://", "livelink://a:1"]),
     ],
 )
-def test_what_is_live(
+def test_arguments_of_live_tracking(
     arguments: tuple[str, ...], streams: list[str], mien: Mien, asked: list[tuple[Any, ...]]
 ) -> None:
     ran = mien("track", *arguments, *HEAD)
@@ -156,7 +156,7 @@ def test_a_live_run_that_is_kept(mien: Mien, asked: list[tuple[Any, ...]]) -> No
         (["0", *HEAD, "--smooth", "slow"], "Invalid value for '--smooth'"),
     ],
 )
-def test_options_that_make_no_sense(arguments: list[str], message: str, mien: Mien) -> None:
+def test_options_that_exclude_each_other(arguments: list[str], message: str, mien: Mien) -> None:
     assert mien("track", *arguments).error.startswith(message)
 
 
@@ -175,7 +175,7 @@ def test_options_that_make_no_sense(arguments: list[str], message: str, mien: Mi
         (["a.mp4", "--live", "--lens", "0px"], "lens: expected more than 0, and less than 180deg"),
     ],
 )
-def test_what_cannot_be_tracked(
+def test_inputs_that_cannot_be_tracked(
     arguments: list[str],
     message: str,
     mien: Mien,
@@ -230,7 +230,7 @@ def test_stopped_and_resumed(
     clip: Path, expressive: Path, mien: Mien, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tracker = Counting()
-    monkeypatch.setattr(ReadyHead, "tracker", lambda ready, *size: tracker)
+    monkeypatch.setattr(PreparedHead, "tracker", lambda prepared, *size: tracker)
     command = ("track", clip, "--head", expressive, "--lens", LENS, "-o")
     assert mien(*command, tmp_path / "whole.csv").status == 0
     tracker.stops_at = 3

@@ -15,7 +15,7 @@ from mien.errors import InputError
 from mien.io.tracks.track_csv import load_track
 from mien.pipelines.live import track_live_video, warm_up
 from mien.pipelines.tracking.outputs import TrackFiles
-from mien.pipelines.tracking.ready_head import ReadyHead
+from mien.pipelines.tracking.prepared_head import PreparedHead
 from mien.render.picture import HeadRenderer
 from mien.track.lens import expected_focal
 from mien.track.smoothing import LiveFilter
@@ -67,12 +67,12 @@ class Nobody:
 def spy(monkeypatch: pytest.MonkeyPatch) -> Spy:
     """In the place of the tracker; warming it up takes no time."""
     one = Spy()
-    monkeypatch.setattr(ReadyHead, "tracker", lambda ready, *size: one.tracker(*size))
+    monkeypatch.setattr(PreparedHead, "tracker", lambda prepared, *size: one.tracker(*size))
     monkeypatch.setattr(mien.pipelines.live, "HeadRenderer", lambda *rest, **more: None)
     monkeypatch.setattr(mien.pipelines.live, "warm_up", lambda *rest: None)
     monkeypatch.setattr(mien.pipelines.live, "LandmarkDetector", Nobody)
     monkeypatch.setattr(Nobody, "closed", 0)
-    monkeypatch.setattr(ReadyHead, "model", type("Model", (), {"rig": None}))
+    monkeypatch.setattr(PreparedHead, "model", type("Model", (), {"rig": None}))
     return one
 
 
@@ -97,14 +97,14 @@ def test_what_was_tracked_is_written(clip: str, spy: Spy, tmp_path: Path) -> Non
     assert len((tmp_path / "o.csv").read_text().splitlines()) == 1 + COUNT
 
 
-def test_the_lens_is_what_is_usual_or_what_is_said(clip: str, spy: Spy) -> None:
+def test_focal_length_is_expected_or_given(clip: str, spy: Spy) -> None:
     track_live_video(clip, head())
     track_live_video(clip, head(), lens="100px")
     usual = expected_focal(head(), 64, 48).focal_px
     assert spy.asked == [(64, 48, pytest.approx(usual)), (64, 48, 100.0)]
 
 
-def test_smoothed_by_a_lag_that_is_known(clip: str, spy: Spy, tmp_path: Path) -> None:
+def test_smoothed_with_a_known_lag(clip: str, spy: Spy, tmp_path: Path) -> None:
     track_live_video(clip, head(), TrackFiles(tmp_path / "t.csv"), lag=0.2)
     calm = LiveFilter(0.2)
     for frame, given in zip(load_track(tmp_path / "t.csv").frames, spy.found, strict=True):
@@ -114,7 +114,7 @@ def test_smoothed_by_a_lag_that_is_known(clip: str, spy: Spy, tmp_path: Path) ->
         np.testing.assert_allclose(frame.state.t_cam_head, state.t_cam_head, atol=1e-9)
 
 
-def test_what_cannot_be_used_is_told_before_anything(clip: str, spy: Spy, tmp_path: Path) -> None:
+def test_bad_arguments_are_refused_before_tracking(clip: str, spy: Spy, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="expected another name than that of the video"):
         track_live_video(clip, head(), TrackFiles(tmp_path / "t.csv", openface=Path(clip)))
     with pytest.raises(InputError, match="expected a name that ends in"):
@@ -131,7 +131,7 @@ def test_what_cannot_be_used_is_told_before_anything(clip: str, spy: Spy, tmp_pa
 @pytest.mark.parametrize(
     ("size", "shown"), [((64, 48), (64, 48)), ((1920, 1080), (480, 270)), ((720, 1280), (270, 480))]
 )
-def test_warm_means_found_followed_and_forgotten(
+def test_warm_up_tracks_two_pictures_and_resets(
     size: tuple[int, int], shown: tuple[int, int]
 ) -> None:
     tracker = Spy()

@@ -19,9 +19,9 @@ from mien.camera import FRONTAL
 from mien.errors import EstimationError, FileFormatError, InputError, MienError
 from mien.io.tracks.track_csv import load_track
 from mien.io.tracks.track_journal import journal_of
-from mien.pipelines.track import COUNTED, STARTED_OVER, Tracked, track_video
+from mien.pipelines.track import FRAME_STAGES, STARTED_OVER, Tracked, track_video
 from mien.pipelines.tracking.outputs import TrackFiles
-from mien.pipelines.tracking.ready_head import ReadyHead
+from mien.pipelines.tracking.prepared_head import PreparedHead
 from mien.track.state import Layout, Status, TrackedFrame, TrackState
 from posable import head, head_of
 
@@ -92,7 +92,7 @@ def tracker(monkeypatch: pytest.MonkeyPatch) -> type[BrightnessTracker]:
         def __exit__(self, *error: object) -> None:
             return None
 
-    monkeypatch.setattr(ReadyHead, "tracker", Fresh)
+    monkeypatch.setattr(PreparedHead, "tracker", Fresh)
     monkeypatch.setattr(mien.pipelines.track, "LandmarkDetector", Nobody)
     monkeypatch.setattr(mien.pipelines.track, "turn_upright", lambda *rest: False)
     monkeypatch.setattr(mien.pipelines.track, "find_focal", lambda *rest: (100.0, "of the lens"))
@@ -147,7 +147,7 @@ def test_a_table_of_all_frames(clip: Path, tmp_path: Path) -> None:
         (Tracked(2, {"ok": 0, "reacquired": 0, "lost": 2}, 0, None, None, 800), "2 frames, 2 lost"),
     ],
 )
-def test_what_the_terminal_says(tracked: Tracked, text: str) -> None:
+def test_text_of_the_summary(tracked: Tracked, text: str) -> None:
     assert str(tracked) == text
 
 
@@ -273,7 +273,7 @@ def test_one_frame(tmp_path: Path) -> None:
     assert len((tmp_path / "l.csv").read_text().splitlines()) == 2
 
 
-def test_nobody_there(tmp_path: Path) -> None:
+def test_clip_without_a_face(tmp_path: Path) -> None:
     files = everything(tmp_path)
     clip = written(tmp_path / "a.mp4", grey([5] * 4))
     told = f"{clip}: expected the head's face, found in none of 4 frames: no face was there; "
@@ -291,7 +291,7 @@ def test_all_that_can_be_written(clip: Path, tmp_path: Path) -> None:
     told: list[str] = []
     track_video(clip, head(), files, progress=lambda stage, done, total: told.append(stage))
     assert list(dict.fromkeys(told)) == ["Tracking", "Drawing the overlay", "Drawing plots"]
-    assert set(told) - set(COUNTED) == {"Drawing plots"}
+    assert set(told) - set(FRAME_STAGES) == {"Drawing plots"}
     assert (tmp_path / "plots" / "index.html").exists()
     for name in ("l.csv", "f.csv"):
         assert len((tmp_path / name).read_text().splitlines()) == 13
@@ -367,7 +367,7 @@ def test_bad_options(
     assert tracker.made == 0
 
 
-def test_what_is_no_video(tmp_path: Path, tracker: type[BrightnessTracker]) -> None:
+def test_files_that_are_no_video(tmp_path: Path, tracker: type[BrightnessTracker]) -> None:
     cases: list[tuple[str, type[MienError], str]] = [
         ("missing.mp4", InputError, r"missing\.mp4: expected a video, got no such file"),
         ("text.mp4", FileFormatError, r"text\.mp4: expected a video, found a text file"),

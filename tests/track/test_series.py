@@ -42,7 +42,7 @@ def test_every_number_is_there(track: Track) -> None:
             assert series.deviations[name][row] == found.deviations[column]
 
 
-def test_nothing_is_known_where_it_is_lost(track: Track) -> None:
+def test_lost_frames_are_nan(track: Track) -> None:
     series = series_of(track)
     assert np.flatnonzero(series.lost).tolist() == LOST
     for array in (series.rms, series.seen, series.rotations, series.angles, series.translations):
@@ -51,12 +51,12 @@ def test_nothing_is_known_where_it_is_lost(track: Track) -> None:
     assert all(np.isnan(values[LOST]).all() for values in series.values.values())
 
 
-def test_a_frame_that_is_lost_has_no_share_that_is_seen(track: Track) -> None:
+def test_lost_frames_have_no_visible_share(track: Track) -> None:
     frames = tuple(replace(found, seen=0.0) for found in track.frames)
     assert np.isnan(series_of(replace(track, frames=frames)).seen[LOST]).all()
 
 
-def test_truth_is_found_by_the_frames_numbers(track: Track, rng: np.random.Generator) -> None:
+def test_reference_is_matched_by_frame_numbers(track: Track, rng: np.random.Generator) -> None:
     reference = replace(track, frames=track.frames[:0:-1])
     found = replace(track, frames=track.frames[::2])
     truth, series = truth_for(found, reference), series_of(found)
@@ -76,7 +76,7 @@ def test_errors_of_a_known_size(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(translation_errors(series, truth), [0.4, np.nan])
 
 
-def test_a_head_that_faces_the_camera_is_the_quaternion_that_turns_nothing(
+def test_frontal_head_is_the_identity_quaternion(
     rng: np.random.Generator,
 ) -> None:
     facing = replace(random_state(rng), R_cam_head=FRONTAL)

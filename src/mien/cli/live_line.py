@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from mien.pipelines.tracking.live_tracker import LiveStatus, LiveSummary
+from mien.pipelines.tracking.live_loop import LiveStatus, LiveSummary
 
 
 @contextmanager
 def live_line(quiet: bool) -> Iterator[Callable[[LiveStatus], None]]:
-    """Draws what it is told on stderr while the block runs; nothing where that is no terminal."""
+    """A function that shows a status on stderr while the block runs, if that is a terminal."""
     from rich.console import Console
     from rich.live import Live
 
@@ -23,7 +23,7 @@ def live_line(quiet: bool) -> Iterator[Callable[[LiveStatus], None]]:
 
 
 def status_text(status: LiveStatus) -> str:
-    """`frame 120 | 29.8 frames/s | 41 ms | ok | 3 dropped | Ctrl-C stops`"""
+    """`frame 120 | 29.8 frames/s | 41 ms | ok | 3 dropped | Ctrl-C stops`."""
     parts = (
         f"frame {status.frame}",
         f"{status.fps:.1f} frames/s",
@@ -36,7 +36,7 @@ def status_text(status: LiveStatus) -> str:
 
 
 def summary_text(summary: LiveSummary) -> str:
-    """`300 frames, 29.8 a second, 4 lost, 3 pictures dropped, 41 ms from picture to packet`"""
+    """`300 frames, 29.8 a second, 4 lost, 3 pictures dropped, 41 ms from picture to packet`."""
     text = (
         f"{summary.frames} frames, {summary.fps:.1f} a second, {summary.lost} lost, "
         f"{summary.dropped} pictures dropped"

@@ -90,7 +90,7 @@ def track(
         from mien.cli.live_line import live_line, summary_text
         from mien.pipelines.live import track_live_video
 
-        with live_line(json_) as tell:
+        with live_line(json_) as on_status:
             summary = track_live_video(
                 video,
                 load_head(head),
@@ -99,13 +99,16 @@ def track(
                 lens=lens,
                 lag=smooth,
                 seconds=seconds,
-                tell=tell,
+                on_status=on_status,
             )
         _print(json_, output, asdict(summary), summary_text(summary), summary.notes)
     elif files is not None:
-        from mien.pipelines.track import COUNTED, track_video
+        from mien.pipelines.track import FRAME_STAGES, track_video
 
-        with _told_of_resume(files.table), terminal_progress(json_, counted=COUNTED) as progress:
+        with (
+            _note_on_resume(files.table),
+            terminal_progress(json_, counted=FRAME_STAGES) as progress,
+        ):
             tracked = track_video(
                 video,
                 load_head(head),
@@ -119,8 +122,8 @@ def track(
 
 
 @contextmanager
-def _told_of_resume(table: Path) -> Iterator[None]:
-    """Whoever stops the block while there is something to resume is told so."""
+def _note_on_resume(table: Path) -> Iterator[None]:
+    """Print how to resume if the block is stopped while there is a journal."""
     from mien.io.tracks.track_journal import journal_of
 
     try:
@@ -140,12 +143,18 @@ def _check_together(
     not_live: Mapping[str, object],
     only_live: Mapping[str, object],
 ) -> None:
-    """Refuse options that mean nothing together. Raises: InputError: names the first of them.
+    """Refuse options that exclude each other.
 
     Args:
+        video: as given.
+        output: as given.
+        is_live: whether the video is tracked live.
         beside_a_table: options by name, falsy where they were not given.
         not_live: options by name, falsy where they were not given.
         only_live: options by name, falsy where they were not given.
+
+    Raises:
+        InputError: names the first of them.
     """
     for name in _given(not_live) if is_live else ():
         raise InputError(name, "a video that is not tracked live", video)

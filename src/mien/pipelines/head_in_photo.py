@@ -14,7 +14,7 @@ from mien.capture.faces.landmarks import cut_note
 from mien.capture.images.photos import Photo, downscale
 from mien.errors import EstimationError
 from mien.head import Head
-from mien.pipelines.tracking.ready_head import ReadyHead
+from mien.pipelines.tracking.prepared_head import PreparedHead
 from mien.rig.rig import Rig
 from mien.synthesis.heads.feature_points import feature_points_on
 from mien.track.lens import expected_focal
@@ -64,11 +64,13 @@ def find_head(head: Head, photo: Photo) -> HeadInPhoto:
     pixels = np.ascontiguousarray(downscale(photo.pixels, _SIDE))
     with LandmarkDetector() as detector:
         largest = detector.detect(photo)  # Fails before the slow preparation of the head.
-        ready = ReadyHead(head, detector, TrackOptions())
+        prepared = PreparedHead(head, detector, TrackOptions())
         # The tracker finds upright faces only.
-        start = ready.head_detector.fit(largest.as_detected_face(), size=photo.size, focal_px=focal)
+        start = prepared.head_detector.fit(
+            largest.as_detected_face(), size=photo.size, focal_px=focal
+        )
         tracked = [
-            ready.tracker(width, height, focal).step(pixels, 0, 0.0, initial)
+            prepared.tracker(width, height, focal).step(pixels, 0, 0.0, initial)
             for initial in (None, start)
         ]
     best = min(tracked, key=lambda frame: np.nan_to_num(frame.rms, nan=np.inf))
@@ -76,10 +78,10 @@ def find_head(head: Head, photo: Photo) -> HeadInPhoto:
     state = best.state if like else start and start.state
     if state is None:
         raise EstimationError(f"{photo.name}: no face found that fits the head")
-    face = ready.model.rig.evaluate(state.face(ready.model.layout))
+    face = prepared.model.rig.evaluate(state.face(prepared.model.layout))
     camera = Camera(width, height, focal, state.R_cam_head, state.t_cam_head)
     landmarks = camera.project(load_generic_head().landmark_positions(face.vertices))
     notes = [f"{photo.name}: {note}" for note in cut_note(landmarks, photo.size)]
     if not like:
         notes.append(f"{photo.name}: {UNLIKE}; its points come from landmarks alone")
-    return HeadInPhoto(feature_points_on(face.vertices), camera, ready.model.rig, tuple(notes))
+    return HeadInPhoto(feature_points_on(face.vertices), camera, prepared.model.rig, tuple(notes))

@@ -1,4 +1,4 @@
-"""`mien track`: the performance in a video, frame by frame, into a table."""
+"""`mien track`: head and face in every frame of a video, written into a table."""
 
 from __future__ import annotations
 
@@ -15,10 +15,9 @@ from mien.capture.video.orientation import turn_upright
 from mien.capture.video.video import Video
 from mien.head import Head
 from mien.io.tracks.track_journal import journal_of
-from mien.pipelines.track_lens import LENS, find_focal
-from mien.pipelines.tracking.notes import check_found, track_notes
-from mien.pipelines.tracking.outputs import OVERLAY, TrackFiles
-from mien.pipelines.tracking.ready_head import ReadyHead
+from mien.pipelines.tracking.notes import check_not_all_lost, track_notes
+from mien.pipelines.tracking.outputs import DRAWING_OVERLAY, TrackFiles
+from mien.pipelines.tracking.prepared_head import FINDING_FOCAL, PreparedHead, find_focal
 from mien.pipelines.tracking.run import TRACKING, TrackRun
 from mien.progress import Progress, no_progress
 from mien.reading.names import check_path
@@ -28,25 +27,25 @@ from mien.track.state import STATUSES, Status, Track
 from mien.track.tracker import TrackOptions
 
 TRACKING_SIDE = 1920
-"""px; larger pictures are tracked reduced to it. Reducing smaller ones would take longer than it
-saves: a face is compared at a size of its own anyway."""
-COUNTED = (LENS, TRACKING, OVERLAY)
+"""px; larger pictures are reduced to it. Reducing smaller ones would take longer than it saves: a
+face is compared at a size of its own."""
+FRAME_STAGES = (FINDING_FOCAL, TRACKING, DRAWING_OVERLAY)
 """Stages whose steps are frames."""
 STARTED_OVER = "the run that was not finished was started over; it could have been resumed"
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """How the tracking of a video went.
+    """Summary of the tracking of a video.
 
     Attributes:
         frames: how many.
-        counts: of these, by status.
-        resumed: of these, how many an earlier run had tracked.
+        counts: of them, by status.
+        resumed: how many of them an earlier run had tracked.
         fps: frames tracked a second, decoding included; None where there was none to track.
         rms: grey levels, the median of the frames'; None where all were lost.
         focal_px: of the video's pictures.
-        notes: what the user should know.
+        notes: for the user.
     """
 
     frames: int
@@ -84,8 +83,9 @@ def track_video(
 ) -> Tracked:
     """Track a head through a video and write its pose and expression in every frame.
 
-    Every frame goes into a journal beside the table at once. A run that is stopped leaves it; one
-    that resumes goes on from there and gives the same files, byte for byte, as an unbroken one.
+    Every frame is added to a journal beside the table at once. A run that is stopped leaves it; one
+    that resumes goes on from there and gives the same files, byte for byte, as one that was not
+    stopped.
     `load_track` reads the table.
 
     Args:
@@ -95,7 +95,7 @@ def track_video(
         lens: as for track.lens.parse_lens; estimated over the first frames unless given.
         smooth_seconds: as track.smoothing.smooth; nothing is smoothed unless given.
         resume: go on where an earlier run was stopped; from the start where there was none.
-        options: how; the defaults unless given.
+        options: of the tracker.
         max_side: px; larger pictures are tracked reduced to it.
         progress: called with the stage, frames done and their total.
 
@@ -108,46 +108,46 @@ def track_video(
         FileFormatError: as InputError.
         EstimationError: when all is written, a video whose frames are all lost.
     """
-    tell = progress or no_progress
+    report = progress or no_progress
     clip = Video(check_path("video", video, "a video"))
     files.check(clip.path)
     if smooth_seconds is not None:
         check_positive("smooth_seconds", smooth_seconds)
-    facts = clip.info()
-    focal_px = None if lens is None else parse_lens(lens, facts.width, facts.height)
+    info = clip.info()
+    focal_px = None if lens is None else parse_lens(lens, info.width, info.height)
     notes = [STARTED_OVER] if journal_of(files.table).exists() and not resume else []
     with LandmarkDetector() as detector:
         if turn_upright(clip, detector):
-            facts = clip.info()
-            focal_px = None if lens is None else parse_lens(lens, facts.width, facts.height)
-        ready = ReadyHead(head, detector, options or TrackOptions())
+            info = clip.info()
+            focal_px = None if lens is None else parse_lens(lens, info.width, info.height)
+        prepared = PreparedHead(head, detector, options or TrackOptions())
         if focal_px is None:
-            focal_px, note = find_focal(clip, facts, ready, tell)
+            focal_px, note = find_focal(clip, info, prepared, report)
             notes.append(note)
-        run = TrackRun(clip, facts, ready, focal_px, max_side)
+        run = TrackRun(clip, info, prepared, focal_px, max_side)
         tracker = run.tracker()
         journal, kept = run.journal(files.table, tracker.layout, resume=resume)
         with journal:
             start = time.perf_counter()
-            frames = run.follow(tracker, journal, kept, tell)
+            frames = run.track_frames(tracker, journal, kept, report)
             seconds = time.perf_counter() - start
             track = run.track(tracker.layout, frames)
-            shown = track if smooth_seconds is None else smooth(track, smooth_seconds)
-            others = tracker.met_others
-            notes += [*clip.notes, *track_notes(track, head, met_others=others)]
-            notes += files.write(shown, clip, head, tell)
+            smoothed = track if smooth_seconds is None else smooth(track, smooth_seconds)
+            met_others = tracker.met_others
+            notes += [*clip.notes, *track_notes(track, head, met_others=met_others)]
+            notes += files.write(smoothed, clip, head, report)
             journal.remove()
-    check_found(track, clip.path, files.table, met_others=others)
+    check_not_all_lost(track, clip.path, files.table, met_others=met_others)
     return _summary(track, len(kept), seconds, notes)
 
 
 def _summary(track: Track, resumed: int, seconds: float, notes: Sequence[str]) -> Tracked:
-    found = Counter(frame.status for frame in track.frames)
+    counts = Counter(frame.status for frame in track.frames)
     count = len(track.frames)
     errors = [frame.rms for frame in track.frames if frame.state is not None]
     return Tracked(
         frames=count,
-        counts={status: found[status] for status in STATUSES},
+        counts={status: counts[status] for status in STATUSES},
         resumed=resumed,
         fps=(count - resumed) / seconds if count > resumed else None,
         rms=median(errors) if errors else None,

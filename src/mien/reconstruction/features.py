@@ -19,22 +19,22 @@ from mien.reconstruction.curves import match_curve, resample_curve
 POINT_SIGMA_MM = 0.5
 """How well a person places a named point (about 1 px where a face fills a 2-megapixel photo)."""
 CURVE_SIGMA_MM = 1.0
-"""How well a drawn curve tells a point's place along it."""
+"""Standard deviation of a point along a drawn curve."""
 EDGE_SIGMA_MM = 2.5
 """How far a landmark on an eye, brow, lip or the nose slides over the skin between views."""
 SKIN_SIGMA_MM = 12.0
-"""The same for one on plain skin, which the detector only interpolates (docs/method/cameras.md)."""
+"""The same for one on plain skin, which the detector interpolates (docs/method/cameras.md)."""
 MIN_CONFIDENCE = 0.1
 """Landmarks below are not used: the surface turns away there."""
 MIN_NAMED_POINTS = 8
 """With so many named points in a photo its camera is found without its curves."""
 MARK_RADIUS_MM = 25.0
-"""A hand-made mark silences the same photo's detector this far around it."""
+"""Landmarks of a photo this near to its hand-made marks are dropped."""
 
 
 @dataclass(frozen=True)
 class Features:
-    """N places on the mesh, seen in K photos.
+    """N points on the mesh, observed in K photos.
 
     Attributes:
         names: (N) point, POLYLINE.INDEX, or landmark number.
@@ -59,7 +59,7 @@ class Features:
 
     @property
     def on_edges(self) -> Bool[Array, " n"]:
-        """(N,) landmarks on something that can be seen."""
+        """(N,) landmarks on a visible edge."""
         return np.isin(self.names, [f"landmark {number}" for number in ON_EDGES])
 
     def on(self, vertices: Float[Array, "... v 3"]) -> Float[Array, "... n 3"]:
@@ -127,7 +127,7 @@ def gather_features(views: Sequence[CapturedView], generic: GenericHead) -> Feat
         sigma_mm=sigma,
         by_hand=np.isfinite(sigma) & (np.arange(image.shape[1]) < len(vertices)),
     )
-    return _silence_landmarks(features, generic).of_photos(np.ones(len(views), bool))
+    return _drop_landmarks_near_marks(features, generic).of_photos(np.ones(len(views), bool))
 
 
 def image_points_for_cameras(features: Features) -> Float[Array, "k n 2"]:
@@ -218,7 +218,7 @@ def _length(curve: Float[Array, "m 2"]) -> float:
     return float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum())
 
 
-def _silence_landmarks(features: Features, generic: GenericHead) -> Features:
+def _drop_landmarks_near_marks(features: Features, generic: GenericHead) -> Features:
     places = features.on(generic.mesh.vertices)
     landmark = np.char.startswith(features.names, "landmark")
     sigma = features.sigma_mm.copy()

@@ -30,9 +30,9 @@ faces and between people who mark them (docs/method/cameras.md)."""
 ATTACHED_SIGMA_MM = 1.5
 """The same for a landmark: the detector that finds it also attached it to the generic head."""
 MIN_DISTANCE_MM = 150.0
-"""No photo of a face is taken from nearer to the eyes; a camera there is a solver gone astray."""
+"""No photo of a face is taken from nearer to the eyes; a camera there is a diverged solution."""
 PRIOR_DEVIATION_MM = 2.5
-"""How far the generic head lies from a person's where no photo tells."""
+"""Standard deviation of a person's head from the generic one where no photo shows it."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def solve_by_features(
             adjusted = _adjust(views, features, cameras, points, generic)
             cameras, points, deviation = adjusted.cameras, adjusted.points, adjusted.point_sd_mm
         else:
-            points, deviation = _intersect(features, cameras, features.on(vertices))
+            points, deviation = _triangulate(features, cameras, features.on(vertices))
         vertices = shape_from_features(features, points, cameras, generic, kernel=options.kernel)
     residuals = residuals_of(features, cameras, vertices)
     uncertainty = vertex_uncertainty(
@@ -147,7 +147,7 @@ def _adjust(
     )
 
 
-def _intersect(
+def _triangulate(
     features: Features, cameras: tuple[Camera, ...], places: Float[Array, "n 3"]
 ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
     """[Pighin 2002] sec. 5.1.3: the features where their rays meet, and how far those miss."""
@@ -169,7 +169,7 @@ def focal_priors(views: Sequence[CapturedView]) -> FocalPrior:
 
 
 def focal_groups(views: Sequence[CapturedView]) -> Int[Array, " k"]:
-    """(K,) the same number for photos of one lens: the frames of a video."""
+    """(K,) the same number for photos of one camera: the frames of a video."""
     files = [view.photo.path for view in views]
     return np.array([files.index(file) for file in files])
 
@@ -177,6 +177,6 @@ def focal_groups(views: Sequence[CapturedView]) -> Int[Array, " k"]:
 def residuals_of(
     features: Features, cameras: Sequence[Camera], vertices: Float[Array, "v 3"]
 ) -> Float[Array, "k n 2"]:
-    """(K, N, 2) px: where the features of a head are seen, less where they were found."""
+    """(K, N, 2) px: projected features of a head less the observed ones."""
     projected = np.stack([camera.project(features.on(vertices)) for camera in cameras])
     return projected - features.image_points

@@ -60,7 +60,7 @@ def find_outlier_photo(typical: Float[Array, " k"]) -> tuple[int, str] | None:
 
 
 def depth_notes(cameras: Sequence[Camera]) -> tuple[str, ...]:
-    """What the user should know when the viewpoints do not tell depth."""
+    """Notes for the user where the viewpoints do not determine depth."""
     if len(cameras) == 1:
         return ("one photo: depth comes from the prior of faces, not from this person",)
     spread = largest_view_angle(cameras)

@@ -11,7 +11,7 @@ import pytest
 from mien.camera import FRONTAL
 from mien.errors import EstimationError
 from mien.head import Head
-from mien.pipelines.tracking.notes import check_found, track_notes
+from mien.pipelines.tracking.notes import check_not_all_lost, track_notes
 from mien.track.state import Track, TrackedFrame, TrackState
 from posable import head
 from tracks import LAYOUT
@@ -45,7 +45,7 @@ def said(*frames: TrackedFrame, met_others: bool = False) -> list[str]:
     return track_notes(track_of(*frames), HEAD, met_others=met_others)
 
 
-def test_nothing_of_an_ordinary_track() -> None:
+def test_ordinary_track_has_no_notes() -> None:
     assert said(shown(0), shown(1, 50.0), shown(2, -120.0)) == []
 
 
@@ -57,7 +57,7 @@ def test_lost_and_cut_frames_are_counted() -> None:
     ]
 
 
-def test_others_are_told_of() -> None:
+def test_note_on_other_faces() -> None:
     (note,) = said(shown(0), lost(1), met_others=True)
     assert note == (
         "the face is lost in 1 of 2 frames, at 0.10 s first; faces were there, none like the "
@@ -65,7 +65,7 @@ def test_others_are_told_of() -> None:
     )
 
 
-def test_a_stranger_is_told_by_the_usual_error() -> None:
+def test_note_on_a_median_error_that_is_too_large() -> None:
     assert said(shown(0), shown(1), shown(2, rms=60.0)) == []
     assert said(shown(0), shown(1, rms=31.0), shown(2, rms=60.0)) == [
         "the face does not look like the head's: another person's, or in other light: error 31 "
@@ -82,6 +82,6 @@ def test_a_stranger_is_told_by_the_usual_error() -> None:
 )
 def test_all_lost(met_others: bool, table: Path | None, message: str) -> None:
     with pytest.raises(EstimationError, match=message):
-        check_found(track_of(lost(0), lost(1)), "a.mp4", table, met_others=met_others)
-    check_found(track_of(lost(0), shown(1)), "a.mp4", table, met_others=met_others)
-    check_found(track_of(), "a.mp4", table, met_others=met_others)
+        check_not_all_lost(track_of(lost(0), lost(1)), "a.mp4", table, met_others=met_others)
+    check_not_all_lost(track_of(lost(0), shown(1)), "a.mp4", table, met_others=met_others)
+    check_not_all_lost(track_of(), "a.mp4", table, met_others=met_others)

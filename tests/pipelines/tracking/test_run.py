@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import mien.pipelines.tracking.ready_head
+import mien.pipelines.tracking.prepared_head
 from filmed import flagged, written
 from mien.arrays import Array
 from mien.camera import FRONTAL, Camera
@@ -22,7 +22,7 @@ from mien.io.tracks.track_journal import journal_of
 from mien.numeric.rotation import angle_between, rotation_from_vector
 from mien.pipelines.track import Tracked, track_video
 from mien.pipelines.tracking.outputs import TrackFiles
-from mien.pipelines.tracking.run import digest, mean_rate
+from mien.pipelines.tracking.run import head_digest, mean_fps
 from mien.render.picture import HeadRenderer
 from mien.rig.state import FaceState
 from mien.track.state import Track, TrackedFrame
@@ -123,7 +123,7 @@ def test_killed_and_resumed_gives_the_same_bytes(
     tables = [TrackFiles(tmp_path / name) for name in ("whole.csv", "t.csv")]
     track_video(clip, filmed.head, tables[0], lens=LENS)
     with monkeypatch.context() as patch:
-        patch.setattr(mien.pipelines.tracking.ready_head, "Tracker", Stopped)
+        patch.setattr(mien.pipelines.tracking.prepared_head, "Tracker", Stopped)
         with pytest.raises(KeyboardInterrupt):
             track_video(clip, filmed.head, tables[1], lens=LENS)
     assert track_video(clip, filmed.head, tables[1], lens=LENS, resume=True).resumed == 3
@@ -142,7 +142,7 @@ def test_a_journal_of_more_frames_than_the_clip_has(
     clip = written(tmp_path / "a.mp4", filmed.frames[:5], TIMES)
     files = TrackFiles(tmp_path / "t.csv")
     with monkeypatch.context() as patch:
-        patch.setattr(mien.pipelines.tracking.ready_head, "Tracker", Stopped)
+        patch.setattr(mien.pipelines.tracking.prepared_head, "Tracker", Stopped)
         with pytest.raises(KeyboardInterrupt):
             track_video(clip, filmed.head, files, lens=LENS)
     journal = journal_of(files.table)
@@ -157,21 +157,21 @@ def test_a_journal_of_more_frames_than_the_clip_has(
     assert not files.table.exists()
 
 
-def test_heads_are_told_apart(filmed: Filmed) -> None:
-    assert digest(filmed.head) == digest(filmed.head) != digest(other_head())
+def test_digests_of_different_heads_differ(filmed: Filmed) -> None:
+    assert head_digest(filmed.head) == head_digest(filmed.head) != head_digest(other_head())
 
 
 @pytest.mark.parametrize(
     ("times", "rate"),
     [([], 25), ([3.0], 25), ([0.0, 0.0], 25), ([0, 0.04001, 0.08], 25), ([0, 0.1, 0.3], 20 / 3)],
 )
-def test_mean_rate(times: list[float], rate: float) -> None:
+def test_mean_fps(times: list[float], rate: float) -> None:
     unknown = np.empty(0)
     frames = [
         TrackedFrame(number, time, "lost", None, np.nan, 0.0, unknown, unknown, unknown)
         for number, time in enumerate(times)
     ]
-    assert mean_rate(frames, 25) == pytest.approx(rate)
+    assert mean_fps(frames, 25) == pytest.approx(rate)
 
 
 COMPANY = (640, 480)
@@ -232,7 +232,7 @@ def test_a_clip_of_somebody_else_alone(filmed: Filmed, shared: Path, tmp_path: P
     assert [item.status for item in load_track(tmp_path / "t.csv").frames] == ["lost"] * 3
 
 
-def test_a_face_that_the_edge_cuts_is_told_of_once(filmed: Filmed, tmp_path: Path) -> None:
+def test_one_note_on_a_face_that_the_edge_cuts(filmed: Filmed, tmp_path: Path) -> None:
     cut = [pixels[:, WIDTH // 2 - 40 :] for pixels in filmed.frames[:5]]
     wide = [np.pad(pixels, ((0, 0), (0, 40), (0, 0)), "edge") for pixels in cut]
     tracked = track_video(

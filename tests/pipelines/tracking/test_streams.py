@@ -86,7 +86,7 @@ def test_live_link_arrives(receiver: socket.socket) -> None:
     assert stream.notes == []
 
 
-def test_vmc_arrives_and_tells_a_lost_face(receiver: socket.socket) -> None:
+def test_vmc_arrives_and_reports_a_lost_face(receiver: socket.socket) -> None:
     stream = Stream(parse_stream(f"vmc://127.0.0.1:{port_of(receiver)}"), units_of)
     stream.send(MOMENT, 2.0)
     stream.send(None, 2.5)
@@ -108,7 +108,9 @@ def test_live_link_is_silent_while_the_face_is_lost(receiver: socket.socket) -> 
 
 
 @pytest.mark.parametrize("protocol", ["vmc", "livelink"])
-def test_nobody_has_to_listen(receiver: socket.socket, protocol: str) -> None:
+def test_a_receiver_that_does_not_listen_is_no_error(
+    receiver: socket.socket, protocol: str
+) -> None:
     port = port_of(receiver)
     receiver.close()
     stream = Stream(StreamAddress(protocol, "127.0.0.1", port), units_of)
@@ -118,7 +120,7 @@ def test_nobody_has_to_listen(receiver: socket.socket, protocol: str) -> None:
     stream.close()
 
 
-def test_what_cannot_be_sent_is_counted_not_fatal(receiver: socket.socket) -> None:
+def test_packets_that_cannot_be_sent_are_counted(receiver: socket.socket) -> None:
     stream = Stream(StreamAddress("vmc", "127.0.0.1", port_of(receiver)), units_of)
     stream.close()
     stream.send(MOMENT, 0.0)
@@ -135,6 +137,6 @@ def test_a_host_that_cannot_be_found(host: str) -> None:
         Stream(StreamAddress("vmc", host, 39539), units_of)
 
 
-def test_a_subject_that_is_too_long_is_told_before_tracking() -> None:
+def test_a_subject_that_is_too_long_is_refused_before_tracking() -> None:
     with pytest.raises(InputError, match="subject: expected a name of 1 to 255 bytes"):
         Stream(StreamAddress("livelink", "127.0.0.1", 11111, "x" * 300), units_of)

@@ -34,13 +34,13 @@ def test_as_wide_as_asked_and_of_even_height(found: TrackedFrame, width: int) ->
     assert strip.shape[0] % 2 == 0
 
 
-def test_what_does_not_change_stands_still(found: TrackedFrame) -> None:
+def test_words_keep_their_positions(found: TrackedFrame) -> None:
     one, other = frame_caption(found, 900), frame_caption(replace(found, frame=11113), 900)
     changed = np.flatnonzero((one != other).any(axis=(0, 2)))
     assert 0 < changed.min() < changed.max() < 130
 
 
-def test_a_word_is_where_it_is_wanted() -> None:
+def test_text_is_centred_where_asked() -> None:
     grey = np.full((60, 120, 3), 90, np.uint8)
     written = draw_text(grey, "x", (250, 20, 20), at=(0.75, 0.5), size=12)
     rows, columns = np.nonzero((written != grey).any(axis=2))

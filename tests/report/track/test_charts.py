@@ -23,7 +23,7 @@ def labels(plot: Plot) -> list[str]:
     return [row.label for row in plot.rows]
 
 
-def test_what_there_is_to_plot(track: Track) -> None:
+def test_names_and_labels_of_all_plots(track: Track) -> None:
     plots = by_name(build_plots(track))
     assert list(plots) == [
         *("rms", "weights_mouth", "weights_eyes", "units"),
@@ -37,7 +37,7 @@ def test_what_there_is_to_plot(track: Track) -> None:
     assert all(row.truth is None for plot in plots.values() for row in plot.rows)
 
 
-def test_numbers_are_the_tracks(track: Track) -> None:
+def test_values_are_the_tracks(track: Track) -> None:
     plots = by_name(build_plots(track))
     found = track.frames[6]
     assert found.state is not None
@@ -62,7 +62,9 @@ def test_truth_brings_errors(track: Track) -> None:
                 np.testing.assert_array_equal(row.truth, row.values)
 
 
-def test_what_the_truth_does_not_tell_has_none(track: Track, rng: np.random.Generator) -> None:
+def test_channels_that_the_reference_lacks_have_no_truth(
+    track: Track, rng: np.random.Generator
+) -> None:
     """As where fewer expressions were used than the model has."""
     layout = Layout(("mouth",), ("neutral", "joy"))
     states = [random_state(rng, layout) for _ in track.frames]
@@ -79,7 +81,7 @@ def test_a_head_of_neutral_alone_has_no_weights(rng: np.random.Generator) -> Non
     assert "eyes" in plots
 
 
-def test_of_many_units_those_that_move_most(rng: np.random.Generator) -> None:
+def test_only_the_units_that_move_most_are_plotted(rng: np.random.Generator) -> None:
     names = tuple(f"unit{index}" for index in range(20))
     layout = Layout((), ("neutral",), names)
     size = np.arange(20) % 5

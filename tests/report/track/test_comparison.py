@@ -41,9 +41,7 @@ def filmed(renderer: HeadRenderer, track: Track, found: TrackedFrame) -> Array:
     return colours
 
 
-def test_a_face_that_is_known_exactly_is_drawn_exactly(
-    renderer: HeadRenderer, track: Track
-) -> None:
+def test_an_exact_track_is_drawn_exactly(renderer: HeadRenderer, track: Track) -> None:
     found = track.frames[0]
     drawn = draw_tracked_head(renderer, track, found)
     assert drawn is not None
@@ -78,7 +76,7 @@ def test_nothing_is_drawn_where_it_is_lost(renderer: HeadRenderer, track: Track)
     assert draw_tracked_head(renderer, track, track.frames[1]) is None
 
 
-def test_the_face_is_what_is_seen_of_it() -> None:
+def test_face_mask_contains_the_visible_face() -> None:
     made: Head = head()
     facing = Camera(260, 260, 400.0, np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0, 600]))
     inside = face_mask(made.mesh, facing)

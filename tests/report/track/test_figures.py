@@ -27,7 +27,7 @@ def saved(path: Path, track: Track, name: str = "weights_mouth") -> Array:
         return np.asarray(image.convert("RGB"))
 
 
-def test_a_picture_with_all_that_is_in_it(tmp_path: Path, track: Track) -> None:
+def test_a_figure_has_its_size_and_colours(tmp_path: Path, track: Track) -> None:
     picture = saved(tmp_path / "a.png", track)
     assert picture.shape[1] == 1300
     for colour in ((0, 114, 178), (217, 217, 217), (213, 94, 0), (26, 26, 26)):
@@ -66,7 +66,7 @@ def test_a_track_of_which_all_is_lost(tmp_path: Path, rng: np.random.Generator) 
         save_figure(tmp_path / f"{plot.name}.png", plot, series)
 
 
-def test_rows_show_all_their_numbers() -> None:
+def test_limits_contain_all_numbers() -> None:
     rows = (
         Row("a", np.array([0.0, 2, np.nan]), truth=np.array([np.nan, 5, 1])),
         Row("b", np.array([0.2, 0.2, 0.2]), np.full(3, 9.0), limits=(0, 1)),

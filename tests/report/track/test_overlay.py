@@ -47,7 +47,7 @@ def far(a: Array, b: object) -> Array:
     return np.abs(a.astype(int) - np.asarray(b)).max(axis=-1)
 
 
-def test_frame_face_over_it_and_head_alone(renderer: HeadRenderer, track: Track) -> None:
+def test_three_panels(renderer: HeadRenderer, track: Track) -> None:
     shown = list(overlay_frames(zip(frames(4), track.frames, strict=True), track, renderer))
     assert len({picture.shape for picture in shown}) == 1
     for index in (0, 1, 3):
@@ -102,7 +102,7 @@ def test_a_clock_rounded_to_milliseconds_does_not_repeat_frames() -> None:
     assert (counts == 1).all()
 
 
-def test_a_video_of_a_video(tmp_path: Path, track: Track) -> None:
+def test_overlay_of_a_clip_of_variable_rate(tmp_path: Path, track: Track) -> None:
     """Of variable rate, and longer than the track."""
     clip = written(tmp_path / "in.mp4", frames(6), times=[0, 1, 4, 5, 6, 7])
     times = [frame.seconds for frame in Video(clip).frames()]

@@ -68,7 +68,7 @@ def test_the_title_is_escaped(tmp_path: Path, track: Track) -> None:
     assert "<h1>a &lt;b&gt; &amp; c</h1>" in page
 
 
-def test_a_track_in_a_few_numbers(rng: np.random.Generator) -> None:
+def test_key_figures(rng: np.random.Generator) -> None:
     track = random_track(rng)
     told = dict(summary(track, series_of(track)))
     assert told["pictures"] == "640x360 px, focal length 812 px"
@@ -79,7 +79,7 @@ def test_a_track_in_a_few_numbers(rng: np.random.Generator) -> None:
     assert told["RMS error, grey levels"] == f"{mean:.1f} on average, {most:.1f} at most"
 
 
-def test_its_distance_from_the_truth(rng: np.random.Generator) -> None:
+def test_error_summary(rng: np.random.Generator) -> None:
     track = random_track(rng)
     moved = tuple(
         replace(found, state=replace(found.state, t_cam_head=1.01 * found.state.t_cam_head))
@@ -135,7 +135,7 @@ def clip_track(rng: np.random.Generator) -> Track:
     return replace(made, width=80, height=60, focal_px=150.0)
 
 
-def test_first_and_last_and_evenly_between(rng: np.random.Generator) -> None:
+def test_frames_are_picked_evenly(rng: np.random.Generator) -> None:
     track = random_track(rng)
     assert [found.frame for found in pick_evenly(track, 3).frames] == [0, 4, 8]
     assert pick_evenly(track, 1).frames == track.frames[:1]
@@ -143,7 +143,7 @@ def test_first_and_last_and_evenly_between(rng: np.random.Generator) -> None:
 
 
 @pytest.mark.parametrize(("columns", "shape"), [(3, (120, 248)), (2, (244, 164)), (9, (120, 248))])
-def test_frames_above_what_was_found(
+def test_sheet_of_frames_above_drawn_heads(
     clip_track: Track, columns: int, shape: tuple[int, int]
 ) -> None:
     track = clip_track

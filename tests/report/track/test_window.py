@@ -25,7 +25,7 @@ def test_the_whole_frame_where_there_is_room(track: Track) -> None:
 
 
 @pytest.mark.parametrize("limits", [(600, 400), (200, 400), (600, 90)])
-def test_where_the_head_goes_where_there_is_not(track: Track, limits: tuple[int, int]) -> None:
+def test_otherwise_the_bounds_of_the_head(track: Track, limits: tuple[int, int]) -> None:
     window = crop_window(track, HEAD, limits)
     assert (np.array(window.size) <= limits).all()
     assert all(side % 2 == 0 for side in window.size)
@@ -39,7 +39,7 @@ def test_where_the_head_goes_where_there_is_not(track: Track, limits: tuple[int,
             assert window.top <= y[inside].min() <= y[inside].max() <= window.bottom
 
 
-def test_its_camera_sees_what_it_shows(track: Track) -> None:
+def test_camera_of_the_window(track: Track) -> None:
     window = crop_window(track, HEAD, (200, 400))
     assert window.factor < 1
     state = track.frames[0].state
@@ -49,7 +49,7 @@ def test_its_camera_sees_what_it_shows(track: Track) -> None:
     np.testing.assert_allclose(part, window.factor * (whole - [window.left, window.top]))
 
 
-def test_a_frame_is_cut_alike_in_any_size(track: Track) -> None:
+def test_crop_does_not_depend_on_the_frames_size(track: Track) -> None:
     rows, columns = np.mgrid[:360, :640]
     frame = np.stack([columns * 255 // 640, rows * 255 // 360, 0 * rows], axis=2).astype(np.uint8)
     window = Window(160, 40, 480, 200, 0.5)

@@ -51,7 +51,7 @@ def visible_in_all(detections: list[ProbeDetection]) -> Array:
     return np.asarray(np.all(weights, axis=0))
 
 
-def test_pictures_tell_where_a_landmark_is_meant() -> None:
+def test_offsets_are_estimated() -> None:
     detections = [detection(*view) for view in VIEWS]
     bias = estimate_bias(POSITIONS, NORMALS, detections)
     visible = visible_in_all(detections)

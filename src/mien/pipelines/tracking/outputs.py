@@ -1,4 +1,4 @@
-"""What `mien track` writes beside its table: an overlay, plots, the track for other programs."""
+"""The files that `mien track` writes: the table, an overlay, plots, tables for other programs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from mien.track.state import Track
 if TYPE_CHECKING:
     from mien.render.picture import HeadRenderer
 
-OVERLAY, PLOTS = "Drawing the overlay", "Drawing plots"
+DRAWING_OVERLAY, DRAWING_PLOTS = "Drawing the overlay", "Drawing plots"
 
 
 @dataclass(frozen=True)
@@ -52,12 +52,13 @@ class TrackFiles:
         """Refuse, before any work is done, places that cannot be written.
 
         Args:
+            video: that is tracked.
             read: files and folders beside the video that must stay as they are, as the head's.
 
         Raises:
-            InputError: names the first of them; two results, or one and what is read, in one.
+            InputError: names the first of them; two results in one file, or a result in an input.
         """
-        self._check_apart(video)
+        self._check_distinct(video)
         written = [self.table, self.overlay, self.live_link, self.openface]
         beside = [sidecar_of(self.table), journal_of(self.table)]
         check_files_apart([*filter(None, written), *beside], [video, *read])
@@ -72,34 +73,38 @@ class TrackFiles:
         for path in filter(None, (self.live_link, self.openface)):
             check_file_place(path)
 
-    def write(self, track: Track, video: Video, head: Head, tell: Progress) -> Iterator[str]:
+    def write(self, track: Track, video: Video, head: Head, progress: Progress) -> Iterator[str]:
         """Write all of them, the table first.
 
         Args:
+            track: of the video.
             video: that was tracked.
-            tell: told stage, steps done and their total.
+            head: that was tracked.
+            progress: called with the stage, steps done and their total.
 
         Yields:
-            what the user should know.
+            Notes for the user.
         """
         save_track(self.table, track)
-        explained = partial(units_from_state, head)
+        units_of = partial(units_from_state, head)
         if self.openface:
-            save_openface(self.openface, track, units_of=explained)
+            save_openface(self.openface, track, units_of=units_of)
         if self.live_link and any(frame.state for frame in track.frames):
-            save_live_link(self.live_link, track_moments(track), units_of=explained)
+            save_live_link(self.live_link, track_moments(track), units_of=units_of)
         elif self.live_link:
             yield f"{self.live_link}: not written: no frame shows the face"
         if self.overlay or self.plots:
             from mien.render.picture import HeadRenderer
 
-            self._draw(track, video, HeadRenderer(head), tell)
+            self._draw(track, video, HeadRenderer(head), progress)
 
-    def _draw(self, track: Track, video: Video, renderer: HeadRenderer, tell: Progress) -> None:
+    def _draw(self, track: Track, video: Video, renderer: HeadRenderer, progress: Progress) -> None:
         if self.overlay:
             from mien.report.track.overlay import save_overlay
 
-            save_overlay(self.overlay, video, track, renderer, progress=partial(tell, OVERLAY))
+            save_overlay(
+                self.overlay, video, track, renderer, progress=partial(progress, DRAWING_OVERLAY)
+            )
         if self.plots:
             from mien.report.track.plots import save_track_plots
 
@@ -109,13 +114,13 @@ class TrackFiles:
                 title=portable_name(video.path),
                 video=video,
                 head=renderer,
-                progress=partial(tell, PLOTS),
+                progress=partial(progress, DRAWING_PLOTS),
             )
 
-    def _check_apart(self, video: Path) -> None:
-        taken = {video.resolve(): "video"}
+    def _check_distinct(self, video: Path) -> None:
+        names = {video.resolve(): "video"}
         for name, path in ((field.name, getattr(self, field.name)) for field in fields(self)):
             if path is not None:
-                other = taken.setdefault(path.resolve(), name)
+                other = names.setdefault(path.resolve(), name)
                 if other != name:
                     raise InputError(path, f"another name than that of the {other}", "the same")

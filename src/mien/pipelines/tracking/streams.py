@@ -1,4 +1,4 @@
-"""Where live tracking goes: `livelink://127.0.0.1:11111`, `vmc://192.168.0.7`."""
+"""Receivers of live tracking: `livelink://127.0.0.1:11111`, `vmc://192.168.0.7`."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ UnitsOf = Callable[[FaceState], Mapping[str, float]]
 
 @dataclass(frozen=True)
 class StreamAddress:
-    """Who receives the packets.
+    """The address of a receiver.
 
     Attributes:
         protocol: "livelink" or "vmc".
-        host: where.
-        port: where.
+        host: its name or IP address.
+        port: its UDP port.
         subject: the name under which Unreal lists a Live Link stream.
     """
 
@@ -47,9 +47,13 @@ class StreamAddress:
 
 
 def parse_stream(text: str) -> StreamAddress:
-    """`livelink://HOST:PORT/SUBJECT` or `vmc://HOST:PORT`; this computer and the usual port unless
+    """The address that a text states; this computer and the usual port unless given.
 
-    given. Raises: InputError: neither, or no port.
+    Args:
+        text: `livelink://HOST:PORT/SUBJECT` or `vmc://HOST:PORT`.
+
+    Raises:
+        InputError: neither, or no port.
     """
     try:
         parts = urlsplit(text)
@@ -57,7 +61,7 @@ def parse_stream(text: str) -> StreamAddress:
     except ValueError as error:
         raise InputError("--stream", "livelink://HOST:PORT or vmc://HOST:PORT", error) from None
     subject = parts.path.strip("/")
-    if parts.scheme not in PORTS or _more(parts) or (subject and parts.scheme == "vmc"):
+    if parts.scheme not in PORTS or _has_extras(parts) or (subject and parts.scheme == "vmc"):
         raise InputError("--stream", "livelink://HOST:PORT or vmc://HOST:PORT", text)
     if port == 0:
         raise InputError("--stream", "a port from 1 to 65535", port)
@@ -65,19 +69,19 @@ def parse_stream(text: str) -> StreamAddress:
     return StreamAddress(parts.scheme, host, port or PORTS[parts.scheme], subject or SUBJECT)
 
 
-def _more(parts: SplitResult) -> bool:
-    """Whether an address says things that mean nothing here."""
+def _has_extras(parts: SplitResult) -> bool:
+    """Whether an address has parts that mean nothing here."""
     return bool(parts.query or parts.fragment or "@" in parts.netloc)
 
 
 class Encoder(Protocol):
     """One protocol's packets."""
 
-    def found(self, moment: Moment, given: Mapping[str, float]) -> bytes:
-        """Of a face that was found; `given`: the units that stand for it."""
+    def encode_face(self, moment: Moment, units: Mapping[str, float]) -> bytes:
+        """The packet of a face, with the weights of the units that stand for it."""
 
-    def lost(self, seconds: float) -> bytes | None:
-        """Of one that was not; None: nothing is sent."""
+    def encode_lost(self, seconds: float) -> bytes | None:
+        """The packet of a lost frame; None: nothing is sent."""
 
 
 @dataclass(frozen=True)
@@ -86,39 +90,44 @@ class LiveLinkEncoder:
 
     Attributes:
         subject: the stream's name.
-        begin: seconds since midnight at time 0 of the moments.
+        start: seconds since midnight at time 0 of the moments.
     """
 
     subject: str
-    begin: float
+    start: float
 
-    def found(self, moment: Moment, given: Mapping[str, float]) -> bytes:
-        seconds, values = self.begin + moment.time, live_link_values(moment, given)
+    def encode_face(self, moment: Moment, units: Mapping[str, float]) -> bytes:
+        """As Encoder.encode_face."""
+        seconds, values = self.start + moment.time, live_link_values(moment, units)
         return live_link_udp.encode(live_link_udp.Packet(self.subject, seconds, values))
 
-    def lost(self, seconds: float) -> None:
-        # Unreal keeps the last values and shows by itself that nothing new comes.
-        return None
+    def encode_lost(self, seconds: float) -> None:
+        """As Encoder.encode_lost."""
+        # Unreal keeps the last values and detects by itself that nothing new comes.
+        return
 
 
 @dataclass(frozen=True)
 class VmcEncoder:
     """Bundles of the VMC protocol."""
 
-    def found(self, moment: Moment, given: Mapping[str, float]) -> bytes:
-        return vmc.encode_face(moment, given)
+    def encode_face(self, moment: Moment, units: Mapping[str, float]) -> bytes:
+        """As Encoder.encode_face."""
+        return vmc.encode_face(moment, units)
 
-    def lost(self, seconds: float) -> bytes:
+    def encode_lost(self, seconds: float) -> bytes:
+        """As Encoder.encode_lost."""
         return vmc.encode_lost(seconds)
 
 
 class Stream:
-    """Packets to one receiver over UDP; nobody knows whether it listens.
+    """Packets to one receiver over UDP, which does not report whether they arrive.
 
-    A packet that cannot be sent is counted and forgotten: the next one follows soon.
+    A packet that cannot be sent is counted and dropped.
 
     Args:
-        units_of: the units that stand for a face.
+        address: of the receiver.
+        units_of: the weights of units for a face state.
 
     Raises:
         InputError: a host that cannot be found, a subject that is too long.
@@ -126,20 +135,25 @@ class Stream:
 
     def __init__(self, address: StreamAddress, units_of: UnitsOf) -> None:
         self.address, self._units_of = address, units_of
-        self._encoder = _encoder_of(address)
-        # A subject that cannot be sent is told now; and what is slow once is done before it counts.
-        self._encoder.found(_AT_REST, {})
+        self._encoder = _make_encoder(address)
+        # The first packet is slow to encode, and raises InputError if the subject is too long.
+        self._encoder.encode_face(_AT_REST, {})
         self._failed, self._reason = 0, ""
-        family, self._target = _resolved(address)
+        family, self._target = _resolve(address)
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
 
     def send(self, moment: Moment | None, seconds: float) -> None:
-        """A frame at its time; None where the face is lost."""
+        """Send a frame.
+
+        Args:
+            moment: None where the face is lost.
+            seconds: its time.
+        """
         if moment is None:
-            data = self._encoder.lost(seconds)
+            data = self._encoder.encode_lost(seconds)
         else:
-            data = self._encoder.found(moment, self._units_of(moment.state))
+            data = self._encoder.encode_face(moment, self._units_of(moment.state))
         try:
             if data is not None:
                 self._socket.sendto(data, self._target)
@@ -149,15 +163,17 @@ class Stream:
 
     @property
     def notes(self) -> list[str]:
+        """For the user: how many packets could not be sent, if any."""
         if not self._failed:
             return []
         return [f"{self.address}: {self._failed} packets could not be sent ({self._reason})"]
 
     def close(self) -> None:
+        """Close the socket."""
         self._socket.close()
 
 
-def _encoder_of(address: StreamAddress) -> Encoder:
+def _make_encoder(address: StreamAddress) -> Encoder:
     if address.protocol == "vmc":
         return VmcEncoder()
     now = datetime.now()
@@ -165,11 +181,11 @@ def _encoder_of(address: StreamAddress) -> Encoder:
     return LiveLinkEncoder(address.subject, (now - midnight).total_seconds())
 
 
-def _resolved(address: StreamAddress) -> tuple[int, tuple]:
-    """The kind of socket, and what it wants to be told."""
+def _resolve(address: StreamAddress) -> tuple[int, tuple]:
+    """The address family and the socket address."""
     try:
-        found = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)
+        addresses = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)
     except (OSError, UnicodeError):
         raise InputError("--stream", "a host that can be found", address.host) from None
-    family, _, _, _, target = found[0]
+    family, _, _, _, target = addresses[0]
     return family, target

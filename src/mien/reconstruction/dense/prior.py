@@ -51,7 +51,7 @@ def load_head_prior() -> HeadPrior:
 
 
 def make_head_prior(generic: GenericHead) -> HeadPrior:
-    """The generic head's identity basis and, beneath it, a Gaussian process of smooth deviations.
+    """The generic head's identity basis and a Gaussian process of smooth deviations from it.
 
     A deviation is split into a symmetric half, which a mirror leaves as it is, and an asymmetric
     half of smaller variance. For a coordinate across the mirror the even modes of space make the
@@ -77,7 +77,7 @@ def _without_similarities(
 ) -> Float[Array, "c v 3"]:
     """The components less what moves, turns or scales the face as a whole.
 
-    Photos do not tell these from a move of the cameras. Left in, they would leave the joint
+    Photos cannot distinguish these from a move of the cameras. Left in, they would leave the joint
     solution's frame and scale to drift; taken out, the mean head fixes both.
     """
     vertices = generic.mesh.vertices

@@ -44,7 +44,7 @@ HAIR_SD_MM = 10.0
 """Across the surface where hair covers it."""
 INDEPENDENT_POINTS = 150
 """What the prior does not express goes together over 15 to 20 mm of skin: however many points are
-followed on a face, they tell no more of the prior's coefficients than so many."""
+followed on a face, they constrain the prior's coefficients no more than so many."""
 ATTACHED_SD_MM, NAMED_SD_MM = 1.5, 6.0
 """How far a landmark's point lies off its attachment on the prior, and a hand-made mark's off the
 vertex of its name: people differ in what they mean by one, and marks count in the end, not here."""
@@ -53,12 +53,12 @@ LANDMARK_SIGMA_FACTOR = 4.0
 CONVERGED_RAD = np.deg2rad(1.0)
 COARSE_ROUNDS = 4
 MIN_TRACKED_POINTS = 150
-"""Fewer points shared by all photos together tell nothing."""
+"""Least number of points shared by all photos together."""
 
 
 @dataclass(frozen=True)
 class Registration:
-    """What the photos together tell.
+    """Cameras and shape from all photos together.
 
     Attributes:
         cameras: one a photo.
@@ -90,9 +90,9 @@ def register_views(
         views: K photos.
         cameras: from landmarks, within some 15 degrees.
         vertices: from landmarks, within some 15 degrees.
-        features: landmarks and marks of the same photos. Landmarks tell what point of the mesh is
-            which, and lead the camera of a photo that shares too little with the others; marks lead
-            all cameras, and the head passes through them in the end.
+        features: landmarks and marks of the same photos. Landmarks determine which point of the
+            mesh is which, and lead the camera of a photo that shares too little with the others;
+            marks lead all cameras, and the head passes through them in the end.
         focal: which photos share a focal length, and their priors.
         generic: the generic head.
         scales: mm a px, from round to round.
@@ -136,7 +136,7 @@ def deviation_from_features(
     focal: FocalGroups,
     generic: GenericHead,
 ) -> Float[Array, " v"]:
-    """(V,) mm: standard deviation of a head that landmarks and marks alone tell (one photo)."""
+    """(V,) mm: standard deviation of a head from landmarks and marks alone (one photo)."""
     prior = load_head_prior()
     problem = _Problem(views, features, focal, generic, prior, _rotations(cameras))
     solution = problem.solve(_State(tuple(cameras), vertices), NO_TRACKS)

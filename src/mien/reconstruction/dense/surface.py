@@ -1,4 +1,4 @@
-"""The surface between and beneath the smooth modes: each vertex along its normal."""
+"""Surface detail that the smooth modes leave out: an offset of each vertex along its normal."""
 
 from __future__ import annotations
 
@@ -57,19 +57,19 @@ def measure_offsets(
     start = tracks.on(mesh.vertices)
     normals = tracks.on(mesh.vertex_normals())
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    pinholes, by_place = PinholeArrays.of(cameras), SegmentSum(tracks.point, len(start))
+    pinholes, sum_by_point = PinholeArrays.of(cameras), SegmentSum(tracks.point, len(start))
     principal = np.stack([camera.principal for camera in cameras])
     image = tracks.image_points - principal[tracks.photo]
     weak = np.eye(3) / _FAR_MM**2
     points = start
     for _ in range(rounds):
-        seen = project_points(pinholes, tracks.photo, points[tracks.point])
-        residuals = seen.image_points - image
+        projection = project_points(pinholes, tracks.photo, points[tracks.point])
+        residuals = projection.image_points - image
         squared = (residuals**2).sum(axis=1) / tracks.sigma_px**2
         weights = 1 / (tracks.sigma_px**2 * (1 + squared / 4))
-        weighted = np.swapaxes(weights[:, None, None] * seen.point_jacobian, 1, 2)
-        covariance = np.linalg.inv(weak + by_place(weighted @ seen.point_jacobian))
-        gradient = by_place((weighted @ residuals[..., None])[..., 0]) + (points - start) @ weak
+        weighted = np.swapaxes(weights[:, None, None] * projection.point_jacobian, 1, 2)
+        covariance = np.linalg.inv(weak + sum_by_point(weighted @ projection.point_jacobian))
+        gradient = sum_by_point((weighted @ residuals[..., None])[..., 0]) + (points - start) @ weak
         points = points - (covariance @ gradient[..., None])[..., 0]
     offsets: Array = ((points - start) * normals).sum(axis=1)
     sd = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariance, normals))
@@ -84,7 +84,7 @@ def move_surface(
     """The head moved to where the photos put it, smoothly.
 
     Minimizes sum_n rho((b_n . h - offset_n) / sd_n) + BENDING * bending(h) over the heights h of
-    the outer skin's vertices. Where no photo tells, h goes on smoothly and fades. A height is
+    the outer skin's vertices. Without observations h continues smoothly and fades. A height is
     along the normal, averaged so far around that the two lips, or the two lids, move the same way
     and do not part. What lies inside (mouth, eye sockets) goes with the skin near it; eyeballs
     stay round.

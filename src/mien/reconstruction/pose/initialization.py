@@ -109,13 +109,13 @@ def resect_robustly(
     The deviation is measured by the extent of the points, so that a pose gone wrong cannot hide
     or inflate it.
     """
-    trust, sigma = weights, np.ones(len(weights))
+    robust_weights, sigma = weights, np.ones(len(weights))
     for _ in range(_ROUNDS):
-        poses = resect(poses, points, image, trust)
+        poses = resect(poses, points, image, robust_weights)
         lengths = np.linalg.norm(reprojection(poses, points) - image, axis=-1) * np.sqrt(weights)
         sigma = np.array([robust_sigma(d[w > 0]) for d, w in zip(lengths, weights, strict=True)])
         sigma = np.maximum(sigma, SIGMA_FLOOR_PX)
-        trust = weights * loss_named(loss)((lengths / sigma[:, None]) ** 2)[1]
+        robust_weights = weights * loss_named(loss)((lengths / sigma[:, None]) ** 2)[1]
     # Weights are relative: a photo whose marks weigh more than another's is not farther off.
     return poses, sigma * np.array(
         [
@@ -127,12 +127,12 @@ def resect_robustly(
 
 
 def _scaled_rotation(image: Array, weights: Array, points: Array) -> Float[Array, "3 3"]:
-    seen = weights > 0
-    if np.count_nonzero(seen) < 4:
-        raise EstimationError(f"a camera needs 4 points, there are {np.count_nonzero(seen)}")
-    root = np.sqrt(weights[seen])[:, None]
-    unknowns = np.column_stack([points[seen], np.ones(np.count_nonzero(seen))])
-    affine = np.linalg.lstsq(root * unknowns, root * image[seen], rcond=1e-9)[0][:3].T
+    observed = weights > 0
+    if np.count_nonzero(observed) < 4:
+        raise EstimationError(f"a camera needs 4 points, there are {np.count_nonzero(observed)}")
+    root = np.sqrt(weights[observed])[:, None]
+    unknowns = np.column_stack([points[observed], np.ones(np.count_nonzero(observed))])
+    affine = np.linalg.lstsq(root * unknowns, root * image[observed], rcond=1e-9)[0][:3].T
     u, singular, vt = np.linalg.svd(affine, full_matrices=False)
     if singular[1] < 1e-6 * singular[0]:
         raise EstimationError("a camera needs points that are not all on one line")
@@ -142,8 +142,8 @@ def _scaled_rotation(image: Array, weights: Array, points: Array) -> Float[Array
 
 def _reversed(rotation: Array, weights: Array, points: Array) -> Float[Array, "3 3"]:
     """The rotation whose flat image of the points' main plane is the same (Necker reversal)."""
-    seen = points[weights > 0]
-    normal = np.linalg.svd(seen - seen.mean(axis=0), full_matrices=False)[2][2]
+    observed = points[weights > 0]
+    normal = np.linalg.svd(observed - observed.mean(axis=0), full_matrices=False)[2][2]
     return np.diag([1.0, 1.0, -1.0]) @ rotation @ (np.eye(3) - 2 * np.outer(normal, normal))
 
 

@@ -77,16 +77,18 @@ def check_problem(
     principal = sizes / 2 if principal_px is None else principal_px
     principal = check_array("principal_px", principal, (len(image), 2))
     seen: Array = np.asarray(np.isfinite(image).all(axis=2))
-    trust = check_array("weights", np.ones(seen.shape) if weights is None else weights, seen.shape)
-    if (trust < 0).any():
-        raise InputError("weights", "numbers of 0 or more", trust.min())
-    trust = np.where(seen, trust, 0.0)
-    if trust.any():
-        trust = trust / np.median(trust[trust > 0])
-    used = trust.any(axis=0)
+    weights = check_array(
+        "weights", np.ones(seen.shape) if weights is None else weights, seen.shape
+    )
+    if (weights < 0).any():
+        raise InputError("weights", "numbers of 0 or more", weights.min())
+    weights = np.where(seen, weights, 0.0)
+    if weights.any():
+        weights = weights / np.median(weights[weights > 0])
+    used = weights.any(axis=0)
     center = points[used].mean(axis=0) if used.any() else np.zeros(3)
     relative = np.where(seen[..., None], image - principal[:, None], 0.0)
-    return PoseProblem(relative, trust, points - center, center, sizes, principal)
+    return PoseProblem(relative, weights, points - center, center, sizes, principal)
 
 
 def residual_lengths(problem: PoseProblem, solution: Alternation) -> Float[Array, "k n"]:

@@ -1,4 +1,4 @@
-"""Live tracking: pictures as they come, a packet to every receiver for each."""
+"""Live tracking: each picture is tracked when it comes and sent to every receiver."""
 
 from __future__ import annotations
 
@@ -21,33 +21,35 @@ from mien.pipelines.tracking.streams import Stream, parse_stream
 from mien.rig.unit_decomposition import units_from_state
 from mien.track.state import Layout, Status, TrackedFrame
 
-_RECENT = 30  # frames over which the rate that is shown is counted
+_RATE_FRAMES = 30  # The rate that is shown is counted over so many frames.
 
 
 class LiveTracker(Protocol):
-    """What tracks; `mien.track.tracker.Tracker` does."""
+    """A tracker; `mien.track.tracker.Tracker` is one."""
 
     layout: Layout
 
-    def step(self, pixels: UInt8[Array, "h w 3"], frame: int, time: float) -> TrackedFrame: ...
+    def step(self, pixels: UInt8[Array, "h w 3"], frame: int, time: float) -> TrackedFrame:
+        """The next picture tracked: sRGB, its number, and its time in seconds."""
 
 
 class Receiver(Protocol):
-    """Who is told of every frame; `mien.pipelines.tracking.streams.Stream` is one."""
+    """A receiver of frames; `mien.pipelines.tracking.streams.Stream` is one."""
 
-    def send(self, moment: Moment | None, seconds: float) -> None: ...
+    def send(self, moment: Moment | None, seconds: float) -> None:
+        """Send a frame at its time; None: the face is lost."""
 
 
 @dataclass(frozen=True)
 class LiveStatus:
-    """How it goes at one frame.
+    """Progress of live tracking at one frame.
 
     Attributes:
         frame: its number.
-        status: how it was found.
-        fps: frames a second lately; 0 at the first.
+        status: as TrackedFrame.status.
+        fps: frames a second over the last ones; 0 at the first.
         latency: seconds from picture to packet.
-        dropped: pictures that came too soon, so far.
+        dropped: pictures that came too soon to be tracked, so far.
     """
 
     frame: int
@@ -59,16 +61,16 @@ class LiveStatus:
 
 @dataclass(frozen=True)
 class LiveSummary:
-    """How it went.
+    """Summary of live tracking.
 
     Attributes:
-        frames: tracked ones.
-        lost: those of them without a face.
-        dropped: pictures left out.
+        frames: how many were tracked.
+        lost: how many of them are lost.
+        dropped: pictures that came too soon to be tracked.
         seconds: from the first packet to the last.
         fps: frames a second; 0 of a single frame.
         latency: median seconds from picture to packet; None where there was no frame.
-        notes: what was odd.
+        notes: for the user.
     """
 
     frames: int
@@ -88,19 +90,20 @@ def run_live(
     *,
     seconds: float | None = None,
     max_side: int | None = None,
-    record: Callable[[TrackedFrame], None] = lambda frame: None,
-    tell: Callable[[LiveStatus], None] = lambda status: None,
+    on_frame: Callable[[TrackedFrame], None] = lambda frame: None,
+    on_status: Callable[[LiveStatus], None] = lambda status: None,
 ) -> LiveSummary:
-    """What `mien track 0` does: open source and streams, track, close them again.
+    """Open a source and streams, track, and close them again.
 
     Args:
-        source: a camera's number or a video, as for `open_source`.
+        source: a camera's number or a video, as for `open_live_source`.
+        head: whose expressions the units of the streams stand for.
         make_tracker: called once, with the source open.
         streams: addresses, as for `parse_stream`.
         seconds: as for `track_live`.
         max_side: as for `track_live`.
-        record: as for `track_live`.
-        tell: as for `track_live`.
+        on_frame: as for `track_live`.
+        on_status: as for `track_live`.
 
     Raises:
         InputError: before anything is tracked, a source or a stream that cannot be opened.
@@ -111,26 +114,26 @@ def run_live(
         opened = [Stream(address, partial(units_from_state, head)) for address in addresses]
         for stream in opened:
             stack.enter_context(closing(stream))
-        live = stack.enter_context(closing(open_source(source)))
+        live = stack.enter_context(closing(open_live_source(source)))
         summary = track_live(
             live,
             make_tracker(live),
             opened,
             seconds=seconds,
             max_side=max_side,
-            record=record,
-            tell=tell,
+            on_frame=on_frame,
+            on_status=on_status,
         )
         notes = (note for stream in opened for note in stream.notes)
         return replace(summary, notes=(*summary.notes, *notes))
 
 
-def open_source(text: str) -> LiveSource:
+def open_live_source(text: str) -> LiveSource:
     """`0`, `1`, … for a camera of this computer; anything else is a video that stands in for one.
 
     Raises:
-        InputError: no such camera, no such video.
-        FileFormatError: no such camera, no such video.
+        InputError: no such camera, no such file.
+        FileFormatError: not a video.
     """
     from mien.capture.video.webcam import Webcam
 
@@ -144,22 +147,25 @@ def track_live(
     *,
     seconds: float | None = None,
     max_side: int | None = None,
-    record: Callable[[TrackedFrame], None] = lambda frame: None,
-    tell: Callable[[LiveStatus], None] = lambda status: None,
+    on_frame: Callable[[TrackedFrame], None] = lambda frame: None,
+    on_status: Callable[[LiveStatus], None] = lambda status: None,
     clock: Callable[[], float] = time.monotonic,
 ) -> LiveSummary:
     """Track until the source ends, Ctrl-C, or so many seconds of the source.
 
     Args:
+        source: of pictures.
         tracker: made for the source's width and height.
+        receivers: that every frame is sent to.
+        seconds: of the source, after which tracking ends.
         max_side: px; larger pictures are tracked reduced to it.
-        record: told every tracked frame, for a file that is written in the end.
-        tell: told after every packet.
+        on_frame: called with every tracked frame.
+        on_status: called after every packet.
         clock: the source's.
     """
     from threadpoolctl import threadpool_limits
 
-    meter = _Meter()
+    meter = _RateMeter()
     one_thread = threadpool_limits(1, user_api="blas")
     with one_thread, closing(source.frames()) as pictures, suppress(KeyboardInterrupt):
         for picture in pictures:
@@ -167,16 +173,16 @@ def track_live(
                 break
             pixels = picture.pixels(max_side=max_side)
             frame = tracker.step(pixels, picture.index, picture.seconds)
-            moment = moment_of(frame, tracker.layout)
+            moment = moment_from_frame(frame, tracker.layout)
             for receiver in receivers:
                 receiver.send(moment, frame.time)
-            record(frame)
-            tell(meter.count(frame, clock(), picture.taken, source.dropped))
+            on_frame(frame)
+            on_status(meter.count(frame, clock(), picture.taken, source.dropped))
     return meter.summary(source)
 
 
-def moment_of(frame: TrackedFrame, layout: Layout) -> Moment | None:
-    """Face and head as the camera sees them: a head at rest faces it. None: a lost frame."""
+def moment_from_frame(frame: TrackedFrame, layout: Layout) -> Moment | None:
+    """A frame's face and head, the pose relative to one that faces the camera; None where lost."""
     state = frame.state
     if state is None:
         return None
@@ -185,13 +191,13 @@ def moment_of(frame: TrackedFrame, layout: Layout) -> Moment | None:
 
 
 @dataclass
-class _Meter:
-    """Counts frames as they are sent."""
+class _RateMeter:
+    """Rate and latency of the frames that are sent."""
 
     frames: int = 0
     lost: int = 0
     first: float = 0.0
-    recent: deque[float] = field(default_factory=lambda: deque(maxlen=_RECENT))
+    recent: deque[float] = field(default_factory=lambda: deque(maxlen=_RATE_FRAMES))
     latencies: array[float] = field(default_factory=lambda: array("d"))
 
     def count(self, frame: TrackedFrame, now: float, taken: float, dropped: int) -> LiveStatus:

@@ -16,10 +16,10 @@ from mien.arrays import Array
 from mien.camera import FRONTAL
 from mien.capture.video.live_source import LiveFrame, LiveSource, PacedVideo
 from mien.errors import InputError
-from mien.pipelines.tracking.live_tracker import (
+from mien.pipelines.tracking.live_loop import (
     LiveStatus,
-    moment_of,
-    open_source,
+    moment_from_frame,
+    open_live_source,
     run_live,
     track_live,
 )
@@ -118,13 +118,13 @@ def tracker(clock: Clock, rng: np.random.Generator) -> Tracker:
     return Tracker(clock, rng)
 
 
-def test_every_picture_is_tracked_sent_recorded_and_told(clock: Clock, tracker: Tracker) -> None:
+def test_every_picture_is_tracked_sent_and_reported(clock: Clock, tracker: Tracker) -> None:
     source, receivers = Source(clock), [Receiver(), Receiver()]
     tracker.lost = (3,)
     recorded: list[TrackedFrame] = []
     told: list[LiveStatus] = []
     summary = track_live(
-        source, tracker, receivers, record=recorded.append, tell=told.append, clock=clock
+        source, tracker, receivers, on_frame=recorded.append, on_status=told.append, clock=clock
     )
     indices = [0, 1, 3, 4, 6, 7]
     assert tracker.seen == [(64, 10 * index, index / 25) for index in indices]
@@ -141,7 +141,7 @@ def test_every_picture_is_tracked_sent_recorded_and_told(clock: Clock, tracker: 
 
 def test_rate_and_latency_are_those_of_the_clock(clock: Clock, tracker: Tracker) -> None:
     told: list[LiveStatus] = []
-    summary = track_live(Source(clock), tracker, tell=told.append, clock=clock)
+    summary = track_live(Source(clock), tracker, on_status=told.append, clock=clock)
     # Pictures 0, 1, 3, 4, 6, 7 of 40 ms; 60 ms of work each, waiting where there is nothing to do.
     done = np.array([0.06, 0.12, 0.18, 0.24, 0.30, 0.36])
     latencies = done - np.array([0, 1, 3, 4, 6, 7]) / 25
@@ -169,7 +169,7 @@ def test_it_stops_after_so_many_seconds(
 def test_ctrl_c_ends_it_and_keeps_what_was_tracked(clock: Clock, tracker: Tracker) -> None:
     source, recorded = Source(clock), list[TrackedFrame]()
     tracker.interrupted = lambda frame: frame == 4
-    summary = track_live(source, tracker, record=recorded.append, clock=clock)
+    summary = track_live(source, tracker, on_frame=recorded.append, clock=clock)
     assert source.closed
     assert summary.frames == len(recorded) == 3
 
@@ -191,7 +191,7 @@ def test_an_error_is_not_swallowed_and_the_source_is_closed(clock: Clock, tracke
     assert source.closed
 
 
-def test_a_moment_is_what_the_camera_sees(rng: np.random.Generator) -> None:
+def test_moment_is_relative_to_a_frontal_head(rng: np.random.Generator) -> None:
     turned = head_rotation(0.3, -0.2, 0.1)
     state = TrackState(
         R_cam_head=FRONTAL @ turned,
@@ -200,7 +200,7 @@ def test_a_moment_is_what_the_camera_sees(rng: np.random.Generator) -> None:
         units=np.array([0.7, 0.0]),
         gaze=np.array([0.1, 0.2]),
     )
-    moment = moment_of(frame_of(7, 1.25, state, rng), LAYOUT)
+    moment = moment_from_frame(frame_of(7, 1.25, state, rng), LAYOUT)
     assert moment is not None
     np.testing.assert_allclose(moment.rotation, turned)
     # To the subject's left, up, and away from the camera, which its z points to.
@@ -208,7 +208,7 @@ def test_a_moment_is_what_the_camera_sees(rng: np.random.Generator) -> None:
     assert moment.time == 1.25
     assert moment.state == state.face(LAYOUT)
     assert moment.state.expressions["mouth"] == {"joy": 0.5, "anger": 0.0}
-    assert moment_of(frame_of(7, 1.25, None, rng), LAYOUT) is None
+    assert moment_from_frame(frame_of(7, 1.25, None, rng), LAYOUT) is None
 
 
 def test_a_video_stands_in_for_the_camera(
@@ -222,13 +222,13 @@ def test_a_video_stands_in_for_the_camera(
     assert summary.fps == pytest.approx(10)
 
 
-def test_what_a_source_is_called(tmp_path: Path) -> None:
+def test_names_of_live_sources(tmp_path: Path) -> None:
     path = written(tmp_path / "a.mp4", grey([20, 60]))
-    assert isinstance(open_source(str(path)), PacedVideo)
+    assert isinstance(open_live_source(str(path)), PacedVideo)
     with pytest.raises(InputError, match="camera 99: expected a camera that is connected"):
-        open_source("99")
+        open_live_source("99")
     with pytest.raises(InputError, match="no such file"):
-        open_source("-1")
+        open_live_source("-1")
 
 
 def test_a_run_opens_source_and_streams_and_sends(tmp_path: Path, tracker: Tracker) -> None:
