@@ -18,16 +18,22 @@ from benchmarks.track_scenes import Performance, choose_three, cluttered, perfor
 from mien.arrays import Array, Float
 from mien.io.head.head_folder import load_head
 from mien.numeric.rotation import angle_between
-from mien.track.face_model import FaceParameters, TrackedFace
-from mien.track.image.colour_gain import Colours
+from mien.track.face_model import FaceModel, FaceParameters
+from mien.track.image.colour_gain import ColourGain
 from mien.track.image.drawing import Pose
-from mien.track.image.frame_pyramid import View, cut_views
-from mien.track.parameters import Belief, Guess
+from mien.track.image.frame_pyramid import FrameCrop, crop_pyramid
+from mien.track.parameters import GaussianPrior, Parameters
 from mien.track.photometric.image_jacobian import POSE_UNKNOWNS
-from mien.track.photometric.level_solver import solve
-from mien.track.photometric.linearization import Linearize, Look, Pictures, Scene, by_bands
-from mien.track.photometric.normal_equations import Equations
-from mien.track.photometric.numeric_jacobian import by_differences, unknowns_named
+from mien.track.photometric.level_solver import solve_level
+from mien.track.photometric.linearization import (
+    ImagePair,
+    Linearization,
+    Linearizer,
+    PyramidLevel,
+    linearize_pose_and_face,
+)
+from mien.track.photometric.normal_equations import NormalEquations
+from mien.track.photometric.numeric_jacobian import numeric_linearizer, select_unknowns
 
 FACE_PX, LEVELS, SCALE = 150.0, 3, 40.0
 EVERY = 5
@@ -54,66 +60,66 @@ HEADER = (
 class Case:
     """One frame at all sizes, the smallest first, the truth about it, and where to start."""
 
-    truth: Guess
-    start: Guess
-    scenes: list[Scene]
+    truth: Parameters
+    start: Parameters
+    scenes: list[PyramidLevel]
 
 
 @dataclass
 class Counted:
     """Linearizations, counted and timed: every guess is drawn anew."""
 
-    way: Linearize
+    way: Linearizer
     seconds: list[float] = field(default_factory=list)
 
-    def __call__(self, scene: Scene, guess: Guess) -> Look:
-        return _Timed(scene, guess, self)
+    def __call__(self, level: PyramidLevel, parameters: Parameters) -> Linearization:
+        return _Timed(level, parameters, self)
 
 
 @dataclass(frozen=True)
 class _Timed:
     """A Look whose equations are always those of a drawing of their own."""
 
-    scene: Scene
-    guess: Guess
+    level: PyramidLevel
+    parameters: Parameters
     counted: Counted
 
-    def equations(self, guess: Guess) -> Equations:
+    def normal_equations(self, parameters: Parameters) -> NormalEquations:
         begun = time.perf_counter()
-        found = self.counted.way(self.scene, guess).equations(guess)
+        found = self.counted.way(self.level, parameters).normal_equations(parameters)
         self.counted.seconds.append(time.perf_counter() - begun)
         return found
 
-    def pictures(self, guess: Guess) -> Pictures:
-        return self.scene.pictures(guess)
+    def image_pair(self, parameters: Parameters) -> ImagePair:
+        return self.level.image_pair(parameters)
 
 
-def cases(model: TrackedFace, shown: Performance, rng: np.random.Generator) -> Iterator[Case]:
+def cases(model: FaceModel, shown: Performance, rng: np.random.Generator) -> Iterator[Case]:
     """Frames, each with a start that is off as predictions from the frame before are."""
     outline = np.unique(model.painted.triangles[model.compared])
     for pixels, frame in list(zip(shown.frames, shown.truth.frames, strict=True))[::EVERY]:
         state = frame.state
         assert state is not None
         own = FaceParameters(model.basis.alpha(state.weights), np.zeros(2), np.zeros(2))
-        truth = Guess(Pose(state.R_cam_head, state.t_cam_head), own)
+        truth = Parameters(Pose(state.R_cam_head, state.t_cam_head), own)
         off = rng.normal(0, [*_POSE_OFF, *[_FACE_OFF] * own.alpha.size, *[0.0] * 4])
-        start = truth.moved(off)
+        start = truth.plus(off)
         anchor = model.anchored(start.face)
         points = shown.truth.camera(state).project(anchor.face.vertices[outline])
         camera = shown.truth.camera(state)
-        views = cut_views(pixels, camera, points, face_px=FACE_PX, levels=LEVELS)
+        views = crop_pyramid(pixels, camera, points, face_px=FACE_PX, levels=LEVELS)
         extent = float(np.ptp(points, axis=0).max()) / camera.focal_px
         yield Case(truth, start, [_scene(model, start, view, extent) for view in views[::-1]])
 
 
-def _scene(model: TrackedFace, start: Guess, view: View, extent: float) -> Scene:
-    target = Colours().luma_before(view.pixels)
+def _scene(model: FaceModel, start: Parameters, view: FrameCrop, extent: float) -> PyramidLevel:
+    target = ColourGain().corrected_luma(view.pixels)
     anchor = model.anchored(start.face)
-    return Scene(model, anchor, view, target, view.inside, SCALE, extent * view.focal)
+    return PyramidLevel(model, anchor, view, target, view.valid, SCALE, extent * view.focal)
 
 
 def measure(
-    model: TrackedFace, fitted: Sequence[Case], way: Linearize, iterations: int, tolerance: float
+    model: FaceModel, fitted: Sequence[Case], way: Linearizer, iterations: int, tolerance: float
 ) -> list[float]:
     """A row of the table but for its name."""
     counted = Counted(way)
@@ -126,37 +132,37 @@ def measure(
 
 
 def _errors(
-    model: TrackedFace, case: Case, way: Linearize, iterations: int, tolerance: float
+    model: FaceModel, case: Case, way: Linearizer, iterations: int, tolerance: float
 ) -> Float[Array, " 3"]:
     """Degrees, percent of the distance, mean absolute error of the weights."""
-    guess, truth = case.start, case.truth
-    deviations = np.array([*_BELIEF, *[_FACE_BELIEF] * len(guess.face.vector)])
+    parameters, truth = case.start, case.truth
+    deviations = np.array([*_BELIEF, *[_FACE_BELIEF] * len(parameters.face.vector)])
     free = np.arange(len(deviations)) != POSE_UNKNOWNS - 1
-    belief = Belief(case.start, deviations)
-    for scene in case.scenes:
-        guess = solve(
-            way(scene, guess), belief, free=free, iterations=iterations, tolerance=tolerance
-        ).guess
-    turned = np.degrees(angle_between(guess.pose.R, truth.pose.R))
-    off = 100 * np.linalg.norm(guess.pose.t - truth.pose.t) / truth.pose.t[2]
-    weights = np.abs(model.weights(guess.face) - model.weights(truth.face)).mean()
+    prior = GaussianPrior(case.start, deviations)
+    for level in case.scenes:
+        parameters = solve_level(
+            way(level, parameters), prior, free=free, iterations=iterations, tolerance=tolerance
+        ).parameters
+    turned = np.degrees(angle_between(parameters.pose.R, truth.pose.R))
+    off = 100 * np.linalg.norm(parameters.pose.t - truth.pose.t) / truth.pose.t[2]
+    weights = np.abs(model.weights(parameters.face) - model.weights(truth.face)).mean()
     return np.array([float(turned), float(off), float(weights)])
 
 
-def ways_of(model: TrackedFace) -> dict[str, Linearize]:
+def ways_of(model: FaceModel) -> dict[str, Linearizer]:
     """What is compared, by name."""
     regions = model.layout.regions
-    every = unknowns_named(model.layout, ("pose", *regions, *model.layout.units, "gaze"))
-    face = every & ~unknowns_named(model.layout, ("pose",))
+    every = select_unknowns(model.layout, ("pose", *regions, *model.layout.units, "gaze"))
+    face = every & ~select_unknowns(model.layout, ("pose",))
     pose = every & ~face
     return {
-        "all analytic": by_bands,
-        "pose by differences": by_differences(pose),
-        "face by differences": by_differences(face),
-        "all by differences": by_differences(every),
-        "all by differences, steps of 1 px": by_differences(every, step_px=1.0),
-        "all analytic, the rig's own face": by_differences(~every, exact=True),
-        "face by differences, the rig's own face": by_differences(face, exact=True),
+        "all analytic": linearize_pose_and_face,
+        "pose by differences": numeric_linearizer(pose),
+        "face by differences": numeric_linearizer(face),
+        "all by differences": numeric_linearizer(every),
+        "all by differences, steps of 1 px": numeric_linearizer(every, step_px=1.0),
+        "all analytic, the rig's own face": numeric_linearizer(~every, exact=True),
+        "face by differences, the rig's own face": numeric_linearizer(face, exact=True),
     }
 
 
@@ -166,7 +172,7 @@ def main() -> None:
     head = load_head(parser.parse_args().head)
     head = with_expressions(head, choose_three(head))
     rng = np.random.default_rng(6)
-    model = TrackedFace(head)
+    model = FaceModel(head)
     fitted = list(cases(model, perform(head, background=cluttered(300, rng)), rng))
     for name, (iterations, tolerance) in BUDGETS.items():
         rows = [

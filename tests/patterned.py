@@ -15,11 +15,11 @@ from mien.head import ATLAS, Expression, Head
 from mien.numeric.raster.rasterizer import interpolate, rasterize
 from mien.numeric.rotation import rotation_from_vector
 from mien.render.morph import MorphRenderer
-from mien.track.face_model import FaceParameters, TrackedFace
+from mien.track.face_model import FaceModel, FaceParameters
 from mien.track.image.drawing import Pose
-from mien.track.image.frame_pyramid import View, cut_views
-from mien.track.parameters import Guess
-from mien.track.photometric.linearization import Scene
+from mien.track.image.frame_pyramid import FrameCrop, crop_pyramid
+from mien.track.parameters import Parameters
+from mien.track.photometric.linearization import PyramidLevel
 from posable import GENERIC, REST, UNITS, head_of, shapes
 
 SIZE, FOCAL = 240, 560.0
@@ -46,9 +46,9 @@ def head(names: tuple[str, ...] = NAMES) -> Head:
 
 
 @cache
-def model(names: tuple[str, ...] = NAMES) -> TrackedFace:
+def model(names: tuple[str, ...] = NAMES) -> FaceModel:
     """That head, prepared."""
-    return TrackedFace(head(names))
+    return FaceModel(head(names))
 
 
 def _eyes() -> Array:
@@ -64,15 +64,15 @@ def pattern(seed: int) -> Array:
     mesh = GENERIC.mesh
     texels = np.column_stack([mesh.uvs[:, 0], 1 - mesh.uvs[:, 1]]) * _TEXELS
     flat = rasterize(texels, np.ones(len(texels)), mesh.uv_triangles, _TEXELS, _TEXELS)
-    places = interpolate(flat, mesh.triangles, REST)
+    positions = interpolate(flat, mesh.triangles, REST)
     around = distance_transform_edt(~flat.mask, return_distances=False, return_indices=True)
-    places = places[tuple(around)]
+    positions = positions[tuple(around)]
     rng = np.random.default_rng(seed)
     colours = np.full((_TEXELS, _TEXELS, 3), 125.0)
     for _ in range(5):
         direction = rng.normal(size=3)
         length = rng.uniform(30, 60)
-        wave = 2 * np.pi * places @ direction / np.linalg.norm(direction) / length
+        wave = 2 * np.pi * positions @ direction / np.linalg.norm(direction) / length
         colours += rng.uniform(8, 22, 3) * np.sin(wave + rng.uniform(0, 2 * np.pi))[..., None]
     return np.clip(np.rint(colours), 0, 255).astype(np.uint8)
 
@@ -107,10 +107,10 @@ def camera(where: Pose, *, size: int = SIZE) -> Camera:
     return Camera(size, size, FOCAL * size / SIZE, where.R, where.t)
 
 
-def picture(guess: Guess, *, names: tuple[str, ...] = NAMES, wall: int = 70) -> Array:
+def picture(parameters: Parameters, *, names: tuple[str, ...] = NAMES, wall: int = 70) -> Array:
     """(SIZE, SIZE, 3) uint8: the rig's own face as mien's renderer draws it."""
-    face = model(names).anchored(guess.face).face
-    seen_from = camera(guess.pose)
+    face = model(names).anchored(parameters.face).face
+    seen_from = camera(parameters.pose)
     image = _renderer(names).render(face, seen_from, samples=9, background=(wall,) * 3)
     return np.ascontiguousarray(image[..., :3])
 
@@ -120,19 +120,21 @@ def _renderer(names: tuple[str, ...]) -> MorphRenderer:
     return MorphRenderer(head(names).mesh, model(names).rig.textures)
 
 
-def view(pixels: Array, where: Pose, *, face_px: float = 150.0, level: int = 0) -> View:
+def crop(pixels: Array, where: Pose, *, face_px: float = 150.0, level: int = 0) -> FrameCrop:
     """What the tracker cuts out of a picture of the head there."""
     shown = model()
     outline = np.unique(shown.painted.triangles[shown.compared])
     points = camera(where).project(REST[outline])
-    return cut_views(pixels, camera(where), points, face_px=face_px, levels=level + 1)[level]
+    return crop_pyramid(pixels, camera(where), points, face_px=face_px, levels=level + 1)[level]
 
 
-def scene(
-    truth: Guess, anchor: FaceParameters | None = None, *, names: tuple[str, ...] = NAMES
-) -> Scene:
+def level(
+    truth: Parameters, anchor: FaceParameters | None = None, *, names: tuple[str, ...] = NAMES
+) -> PyramidLevel:
     """The truth, drawn by the tracker's own means, to be explained around an anchor."""
     shown = model(names)
-    cut = view(picture(truth, names=names), truth.pose)
-    of = Scene(shown, shown.anchored(anchor or truth.face), cut, cut.inside, cut.inside, 1e3, 150.0)
+    cut = crop(picture(truth, names=names), truth.pose)
+    of = PyramidLevel(
+        shown, shown.anchored(anchor or truth.face), cut, cut.valid, cut.valid, 1e3, 150.0
+    )
     return replace(of, target=of.draw(truth, layers=False).luma)

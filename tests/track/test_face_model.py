@@ -11,7 +11,7 @@ from mien.errors import InputError
 from mien.rig.basis import WEIGHT_RANGE
 from mien.rig.followers import part_vertices
 from mien.rig.state import FaceState, Gaze
-from mien.track.face_model import FaceParameters, TrackedFace, within_range
+from mien.track.face_model import FaceModel, FaceParameters, within_range
 from mien.track.photometric.image_jacobian import POSE_UNKNOWNS
 
 MIXED = patterned.doing(
@@ -20,31 +20,31 @@ MIXED = patterned.doing(
 
 
 @pytest.fixture
-def model() -> TrackedFace:
+def model() -> FaceModel:
     return patterned.model()
 
 
 def stepped(face: FaceParameters, unknown: int, step: float) -> FaceParameters:
-    moves = np.zeros(len(face.vector))
-    moves[unknown] = step
-    return face.moved(moves)
+    offsets = np.zeros(len(face.vector))
+    offsets[unknown] = step
+    return face.plus(offsets)
 
 
-def test_layout(model: TrackedFace) -> None:
+def test_layout(model: FaceModel) -> None:
     assert model.layout.regions == ("mouth", "eyes", "forehead")
     assert model.layout.expressions == patterned.NAMES
     assert model.layout.units == ("eyeBlinkLeft", "eyeBlinkRight")
-    assert model.moves.shape[0] == 3 * 2 + 2 + 2 == len(model.neutral.vector)
+    assert model.offsets.shape[0] == 3 * 2 + 2 + 2 == len(model.neutral.vector)
 
 
-def test_neutral_is_the_head_as_photographed(model: TrackedFace) -> None:
+def test_neutral_is_the_head_as_photographed(model: FaceModel) -> None:
     weights = model.weights(model.neutral)
     np.testing.assert_allclose(weights, [[1, 0, 0]] * 3, atol=1e-12)
     vertices = model.anchored(model.neutral).face.vertices
     np.testing.assert_allclose(vertices, patterned.REST, atol=1e-9)
 
 
-def test_at_its_anchor_it_is_the_rigs_own_face(model: TrackedFace) -> None:
+def test_at_its_anchor_it_is_the_rigs_own_face(model: FaceModel) -> None:
     state = FaceState(
         {"mouth": {"joy": 0.5, "anger": 0.2}, "forehead": {"joy": 0.1, "anger": 0.4}},
         {"eyeBlinkLeft": 0.2, "eyeBlinkRight": 0.3},
@@ -57,14 +57,14 @@ def test_at_its_anchor_it_is_the_rigs_own_face(model: TrackedFace) -> None:
     np.testing.assert_allclose(found.brightness, own.brightness, atol=1e-12)
 
 
-def test_parameters_must_be_finite(model: TrackedFace) -> None:
+def test_parameters_must_be_finite(model: FaceModel) -> None:
     anchor = model.anchored(MIXED)
     with pytest.raises(InputError, match="parameters: expected finite numbers"):
         model.posed(anchor, stepped(MIXED, 3, np.nan))
 
 
 @pytest.mark.parametrize("unknown", range(6))
-def test_expressions_move_as_in_the_rig(model: TrackedFace, unknown: int) -> None:
+def test_expressions_move_as_in_the_rig(model: FaceModel, unknown: int) -> None:
     """The rig differs where lids ride on the eyes and lips touch: there alone."""
     step = 0.05
     anchor = model.anchored(MIXED)
@@ -78,8 +78,8 @@ def test_expressions_move_as_in_the_rig(model: TrackedFace, unknown: int) -> Non
 
 
 @pytest.mark.parametrize(("unknown", "side"), [(6, "left"), (7, "right")])
-def test_blinks_shut_their_own_eye(model: TrackedFace, unknown: int, side: str) -> None:
-    move = model.moves[unknown]
+def test_blinks_shut_their_own_eye(model: FaceModel, unknown: int, side: str) -> None:
+    move = model.offsets[unknown]
     middle = patterned.GENERIC.vertex_of(f"{side}_upper_eyelid.3")
     other = "left" if side == "right" else "right"
     assert move[middle, 1] < -5
@@ -90,33 +90,33 @@ def test_blinks_shut_their_own_eye(model: TrackedFace, unknown: int, side: str) 
 
 
 @pytest.mark.parametrize(("axis", "unknown"), [("yaw", 8), ("pitch", 9)])
-def test_eyes_turn_as_in_the_rig(model: TrackedFace, axis: str, unknown: int) -> None:
+def test_eyes_turn_as_in_the_rig(model: FaceModel, axis: str, unknown: int) -> None:
     """Positive yaw to the subject's left (x), positive pitch up (y)."""
     step, eyes = 0.05, part_vertices(patterned.GENERIC, "left_eyeball", "right_eyeball")
     turned = [
         model.rig.evaluate(FaceState(gaze=Gaze(**{axis: by}))).vertices for by in (-step, step)
     ]
     rate = (turned[1] - turned[0])[eyes] / (2 * step)
-    found = model.moves[unknown][eyes]
+    found = model.offsets[unknown][eyes]
     assert np.linalg.norm(found - rate, axis=1).max() < 0.05 * np.linalg.norm(rate, axis=1).max()
     front = eyes[patterned.REST[eyes, 2] > np.quantile(patterned.REST[eyes, 2], 0.95)]
-    assert model.moves[unknown][front, "xyz".index("x" if axis == "yaw" else "y")].min() > 5
+    assert model.offsets[unknown][front, "xyz".index("x" if axis == "yaw" else "y")].min() > 5
 
 
-def test_what_concerns_a_triangle(model: TrackedFace) -> None:
+def test_what_concerns_a_triangle(model: FaceModel) -> None:
     """Lists of unknowns hold the pose's everywhere, and all that moves or mixes a corner."""
-    answers = model.answers
+    support = model.support
     rng = np.random.default_rng(3)
-    for triangle in rng.integers(0, len(answers.triangles), 200):
-        row = answers.set_of[triangle]
-        active = answers.sets[row, : answers.sizes[row]]
-        corners = answers.triangles[triangle]
+    for triangle in rng.integers(0, len(support.triangles), 200):
+        row = support.set_of[triangle]
+        active = support.sets[row, : support.sizes[row]]
+        corners = support.triangles[triangle]
         assert set(range(POSE_UNKNOWNS)) <= set(active.tolist())
-        moved = np.linalg.norm(model.moves[:, corners], axis=2).max(axis=1) > 0.06
+        moved = np.linalg.norm(model.offsets[:, corners], axis=2).max(axis=1) > 0.06
         assert set(POSE_UNKNOWNS + np.flatnonzero(moved)) <= set(active.tolist())
-        mixed = answers.masks[corners].max(axis=0) > 0
-        own = [n for n in range(len(answers.region)) if answers.region[n] >= 0]
-        assert all((n in active) >= mixed[answers.region[n]] for n in own)
+        mixed = support.masks[corners].max(axis=0) > 0
+        own = [n for n in range(len(support.region)) if support.region[n] >= 0]
+        assert all((n in active) >= mixed[support.region[n]] for n in own)
 
 
 def test_weights_stay_in_range_without_changing_their_kind() -> None:
@@ -145,6 +145,6 @@ def test_neutral_only() -> None:
 
 def test_unknown_names() -> None:
     with pytest.raises(InputError, match="region"):
-        TrackedFace(patterned.head(), regions=("nose",))
+        FaceModel(patterned.head(), regions=("nose",))
     with pytest.raises(InputError, match=r"units.*wink"):
-        TrackedFace(patterned.head(), units=("wink",))
+        FaceModel(patterned.head(), units=("wink",))

@@ -15,18 +15,18 @@ from mien.arrays import Array
 from mien.errors import InputError
 from mien.numeric.rotation import angle_between
 from mien.track.landmarks.initialization import HeadDetection, HeadDetector
-from mien.track.parameters import Guess
+from mien.track.parameters import Parameters
 from mien.track.state import TrackedFrame, TrackState
-from mien.track.tracker import STRANGE_RMS, Tracker, TrackOptions
+from mien.track.tracker import MISMATCH_RMS, Tracker, TrackOptions
 
 FRAMES, FPS = 8, 25.0
 NOBODY = np.full((patterned.SIZE, patterned.SIZE, 3), 70, np.uint8)
 
 
-def truth(number: int) -> Guess:
+def truth(number: int) -> Parameters:
     """A head that turns and comes nearer while its mouth goes from neutral towards joy."""
     where = patterned.pose((4, 2 * number - 6, -3), (8 + number, -12, 630 - 2 * number))
-    return Guess(where, patterned.doing({"mouth": (0.09 * number, 0.0)}))
+    return Parameters(where, patterned.doing({"mouth": (0.09 * number, 0.0)}))
 
 
 @cache
@@ -34,9 +34,11 @@ def frame(number: int) -> Array:
     return patterned.picture(truth(number))
 
 
-def state_of(guess: Guess) -> TrackState:
-    weights = patterned.model().weights(guess.face)
-    return TrackState(guess.pose.R, guess.pose.t, weights, guess.face.units, guess.face.gaze)
+def state_of(parameters: Parameters) -> TrackState:
+    weights = patterned.model().weights(parameters.face)
+    return TrackState(
+        parameters.pose.R, parameters.pose.t, weights, parameters.face.units, parameters.face.gaze
+    )
 
 
 class Told:
@@ -52,13 +54,13 @@ class Told:
             return []
         off = np.zeros(17)
         off[:6] = (0.015, -0.015, 0.01, 3, -2, 8)
-        return [HeadDetection(state_of(truth(self.number).moved(off)), 1.0)]
+        return [HeadDetection(state_of(truth(self.number).plus(off)), 1.0)]
 
 
 @pytest.fixture
 def told(monkeypatch: pytest.MonkeyPatch) -> Told:
     one = Told()
-    monkeypatch.setattr(HeadDetector, "find", one.find)
+    monkeypatch.setattr(HeadDetector, "detect", one.detect)
     return one
 
 
@@ -191,11 +193,11 @@ def test_of_several_faces_the_heads_own_is_found(
 ) -> None:
     """The first, larger one is somewhere else; the landmarks of both fit alike."""
     elsewhere = HeadDetection(
-        state_of(Guess(patterned.pose((0, 0, 0), (90, 40, 500)), truth(0).face)), 1.0
+        state_of(Parameters(patterned.pose((0, 0, 0), (90, 40, 500)), truth(0).face)), 1.0
     )
-    alone = told.find
+    alone = told.detect
     monkeypatch.setattr(
-        HeadDetector, "find", lambda *rest, **options: [elsewhere, *alone(**options)]
+        HeadDetector, "detect", lambda *rest, **options: [elsewhere, *alone(**options)]
     )
     by = tracker()
     found = by.step(frame(0), 0, 0.0)
@@ -215,7 +217,7 @@ def test_after_the_head_no_other_face_is_taken_for_it(told: Told) -> None:
     other = disturbed(6)
     told.number = 6
     alone = tracker()
-    assert alone.step(other, 0, 0.0).rms > STRANGE_RMS, "where nobody else was, it may be the head"
+    assert alone.step(other, 0, 0.0).rms > MISMATCH_RMS, "where nobody else was, it may be the head"
     told.number = 0
     by = tracker()
     assert [item.status for item in followed([frame(k) for k in range(5)], by)] == ["ok"] * 5

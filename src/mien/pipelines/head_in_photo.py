@@ -18,7 +18,7 @@ from mien.pipelines.tracking.prepared_head import PreparedHead
 from mien.rig.rig import Rig
 from mien.synthesis.heads.feature_points import feature_points_on
 from mien.track.lens import expected_focal
-from mien.track.tracker import STRANGE_RMS, TrackOptions
+from mien.track.tracker import MISMATCH_RMS, TrackOptions
 
 __all__ = ["UNLIKE", "HeadInPhoto", "find_head"]
 
@@ -74,7 +74,7 @@ def find_head(head: Head, photo: Photo) -> HeadInPhoto:
             for initial in (None, start)
         ]
     best = min(tracked, key=lambda frame: np.nan_to_num(frame.rms, nan=np.inf))
-    like = best.state is not None and best.rms <= STRANGE_RMS
+    like = best.state is not None and best.rms <= MISMATCH_RMS
     state = best.state if like else start and start.state
     if state is None:
         raise EstimationError(f"{photo.name}: no face found that fits the head")

@@ -1,4 +1,4 @@
-"""[Pighin 2002]'s parameters p, and what is expected of them (sec. 6.1)."""
+"""[Pighin 2002]'s parameters p of one frame, and the prior on them (sec. 6.1)."""
 
 from __future__ import annotations
 
@@ -9,17 +9,22 @@ import numpy as np
 from mien.arrays import Array, Float
 from mien.track.face_model import FaceParameters
 from mien.track.image.drawing import Pose
-from mien.track.photometric.image_jacobian import POSE_UNKNOWNS
+from mien.track.photometric.image_jacobian import (
+    LOG_FOCAL,
+    POSE_UNKNOWNS,
+    ROTATION,
+    TRANSLATION,
+)
 
 
 @dataclass(frozen=True)
-class Guess:
+class Parameters:
     """[Pighin 2002]'s parameters p: where the head is and what the face does."""
 
     pose: Pose
     face: FaceParameters
 
-    def moved(self, step: Float[Array, " n"]) -> Guess:
+    def plus(self, step: Float[Array, " n"]) -> Parameters:
         """After a step in all unknowns: R <- R^ R, everything else by addition.
 
         Source:
@@ -27,30 +32,30 @@ class Guess:
         """
         import cv2
 
-        turned = cv2.Rodrigues(np.asarray(step[:3]))[0] @ self.pose.R
-        zoom = self.pose.zoom * float(np.exp(step[6]))
-        pose = Pose(turned, self.pose.t + step[3:6], zoom)
-        return Guess(pose, self.face.moved(step[POSE_UNKNOWNS:]))
+        rotation = cv2.Rodrigues(np.asarray(step[ROTATION]))[0] @ self.pose.R
+        zoom = self.pose.zoom * float(np.exp(step[LOG_FOCAL]))
+        pose = Pose(rotation, self.pose.t + step[TRANSLATION], zoom)
+        return Parameters(pose, self.face.plus(step[POSE_UNKNOWNS:]))
 
-    def since(self, other: Guess) -> Float[Array, " n"]:
-        """The step that leads here from another."""
+    def minus(self, other: Parameters) -> Float[Array, " n"]:
+        """The step that leads from the other parameters to these: the inverse of plus."""
         import cv2
 
         # Never near a half turn, where this is less exact than numeric.rotation, and far quicker.
-        turn = cv2.Rodrigues(self.pose.R @ other.pose.R.T)[0].ravel()
-        zoom = np.log(self.pose.zoom / other.pose.zoom)
+        rotation = cv2.Rodrigues(self.pose.R @ other.pose.R.T)[0].ravel()
+        log_focal = np.log(self.pose.zoom / other.pose.zoom)
         face = self.face.vector - other.face.vector
-        return np.concatenate([turn, self.pose.t - other.pose.t, [zoom], face])
+        return np.concatenate([rotation, self.pose.t - other.pose.t, [log_focal], face])
 
 
 @dataclass(frozen=True)
-class Belief:
-    """What is expected before the picture is looked at.
+class GaussianPrior:
+    """What is expected of a frame's parameters before its pixels are compared.
 
     Attributes:
-        mean: the likeliest.
-        deviations: (N,) standard deviations of a step away from it, each by itself.
+        mean: the expected parameters.
+        deviations: (N,) standard deviations of a step away from them, independent of each other.
     """
 
-    mean: Guess
+    mean: Parameters
     deviations: Float[Array, " n"]

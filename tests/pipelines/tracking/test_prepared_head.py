@@ -32,13 +32,13 @@ def test_model_and_head_detector_are_made_once(monkeypatch: pytest.MonkeyPatch) 
         for module in ("mien.pipelines.tracking.prepared_head", "mien.track.tracker"):
             monkeypatch.setattr(f"{module}.{name}", make)
 
-    for name in ("TrackedFace", "HeadDetector"):
+    for name in ("FaceModel", "HeadDetector"):
         counted(name)
     prepared = PreparedHead(patterned.head(), Blind(), TrackOptions(units=("jawOpen",)))
     assert made == [], "nothing before it is used"
     head_detector = prepared.head_detector
     tracker = prepared.tracker(64, 48, 100.0)
-    assert made == ["TrackedFace", "HeadDetector"]
+    assert made == ["FaceModel", "HeadDetector"]
     assert tracker.layout is head_detector.layout
     assert tracker.layout.units == ("jawOpen",)
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mien.arrays import Array
-from mien.track.image.colour_gain import Colours, match_colours
+from mien.track.image.colour_gain import ColourGain, estimate_colour_gain
 from mien.track.image.greyscale import LUMA
 
-TRUE = Colours(np.array([1.2, 0.8, 0.95]), np.array([-12.0, 20.0, 3.0]))
+TRUE = ColourGain(np.array([1.2, 0.8, 0.95]), np.array([-12.0, 20.0, 3.0]))
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def everywhere(picture: Array) -> Array:
 
 
 def test_gain_and_bias_are_found(drawn: Array) -> None:
-    found = match_colours(drawn, TRUE.applied(drawn), everywhere(drawn))
+    found = estimate_colour_gain(drawn, TRUE.applied(drawn), everywhere(drawn))
     np.testing.assert_allclose(found.gain, TRUE.gain, atol=0.01)
     np.testing.assert_allclose(found.applied(drawn), TRUE.applied(drawn), atol=0.5)
 
@@ -31,30 +31,30 @@ def test_gain_and_bias_are_found(drawn: Array) -> None:
 def test_pixels_without_weight_do_not_count(drawn: Array) -> None:
     target, weights = TRUE.applied(drawn), everywhere(drawn)
     target[:20], weights[:20] = 0, 0
-    found = match_colours(drawn, target, weights)
+    found = estimate_colour_gain(drawn, target, weights)
     np.testing.assert_allclose(found.gain, TRUE.gain, atol=0.01)
 
 
 def test_a_plain_face_is_only_brighter(drawn: Array, rng: np.random.Generator) -> None:
     plain = np.float32(120 + 0.3 * rng.normal(size=drawn.shape))
     noisy = np.float32(plain + 15 + 8 * rng.normal(size=drawn.shape))
-    found = match_colours(plain, noisy, everywhere(plain))
+    found = estimate_colour_gain(plain, noisy, everywhere(plain))
     np.testing.assert_allclose(found.gain, 1, atol=0.25)
     np.testing.assert_allclose(found.applied(plain).mean(axis=(0, 1)), 135, atol=1)
 
 
 def test_nothing_seen_changes_nothing(drawn: Array) -> None:
-    found = match_colours(drawn, TRUE.applied(drawn), 0 * everywhere(drawn))
+    found = estimate_colour_gain(drawn, TRUE.applied(drawn), 0 * everywhere(drawn))
     np.testing.assert_array_equal(found.gain, 1)
     np.testing.assert_array_equal(found.bias, 0)
 
 
 def test_luma_before_is_that_of_the_drawn_picture(drawn: Array) -> None:
-    found = TRUE.luma_before(TRUE.applied(drawn))
+    found = TRUE.corrected_luma(TRUE.applied(drawn))
     np.testing.assert_allclose(found, drawn @ np.array(LUMA), atol=1e-2)
 
 
 def test_towards() -> None:
-    half = Colours().towards(TRUE, 0.5)
+    half = ColourGain().towards(TRUE, 0.5)
     np.testing.assert_allclose(half.gain, [1.1, 0.9, 0.975])
     np.testing.assert_allclose(half.bias, [-6, 10, 1.5])

@@ -9,7 +9,7 @@ import pytest
 
 from mien.arrays import Array
 from mien.camera import Camera
-from mien.track.image.frame_pyramid import View, cut_views
+from mien.track.image.frame_pyramid import FrameCrop, crop_pyramid
 
 CAMERA = Camera(320, 240, 500.0, np.diag([1.0, -1.0, -1.0]), np.array([10.0, 5.0, 700.0]))
 FACE = np.array([[100.0, 60.0], [220.0, 190.0]])
@@ -19,13 +19,13 @@ def frame(value: int = 100) -> Array:
     return np.full((240, 320, 3), value, np.uint8)
 
 
-def cut(pixels: Array, points: Array = FACE, *, face_px: float = 60.0) -> list[View]:
-    return cut_views(pixels, CAMERA, points, face_px=face_px, levels=3)
+def cut(pixels: Array, points: Array = FACE, *, face_px: float = 60.0) -> list[FrameCrop]:
+    return crop_pyramid(pixels, CAMERA, points, face_px=face_px, levels=3)
 
 
-def spot(view: View) -> Array:
+def spot(crop: FrameCrop) -> Array:
     """(2,) px: centre of what is bright."""
-    bright = view.pixels[..., 0].astype(np.float64) * view.inside
+    bright = crop.pixels[..., 0].astype(np.float64) * crop.valid
     rows, columns = np.indices(bright.shape) + 0.5
     return np.array([(bright * columns).sum(), (bright * rows).sum()]) / bright.sum()
 
@@ -40,9 +40,9 @@ def test_a_place_is_seen_where_the_view_says(rng: np.random.Generator) -> None:
         away = np.hypot(columns + 0.5 - at[0], rows + 0.5 - at[1])
         pixels[rows, columns] = (200 * np.exp(-((away / 3) ** 2)))[..., None]
         seen = CAMERA.to_camera(place[None])[0]
-        for view in cut(pixels):
-            expected = view.focal * seen[:2] / seen[2] + (view.cx, view.cy)
-            np.testing.assert_allclose(spot(view), expected, atol=0.1)
+        for crop in cut(pixels):
+            expected = crop.focal * seen[:2] / seen[2] + (crop.cx, crop.cy)
+            np.testing.assert_allclose(spot(crop), expected, atol=0.1)
 
 
 def test_each_view_is_half_of_the_one_before() -> None:
@@ -73,25 +73,25 @@ def test_a_face_that_moves_a_little_leaves_the_pixels_where_they_are() -> None:
 @pytest.mark.parametrize("shift", [(-150, 0), (160, 0), (0, -130), (0, 140), (-150, 140)])
 def test_beyond_the_frame_nothing_is_told(shift: tuple[int, int]) -> None:
     whole = cut(frame())
-    for view, inner in zip(cut(frame(), FACE + shift), whole, strict=True):
+    for crop, inner in zip(cut(frame(), FACE + shift), whole, strict=True):
         # The frame's own rectangle, in px of the view.
-        scale = view.focal / CAMERA.focal_px
-        corner = np.array([view.cx, view.cy]) - scale * CAMERA.principal
-        columns, rows = np.arange(view.size[0]) + 0.5, np.arange(view.size[1]) + 0.5
+        scale = crop.focal / CAMERA.focal_px
+        corner = np.array([crop.cx, crop.cy]) - scale * CAMERA.principal
+        columns, rows = np.arange(crop.size[0]) + 0.5, np.arange(crop.size[1]) + 0.5
         across = (columns > corner[0]) & (columns < corner[0] + 320 * scale)
         down = (rows > corner[1]) & (rows < corner[1] + 240 * scale)
         expected = down[:, None] & across
         assert 0.1 < expected.mean() < 1
-        np.testing.assert_array_equal(view.inside > 0.5, expected)
-        np.testing.assert_allclose(view.pixels, 100, atol=1e-3)
-        assert inner.inside.min() == 1
+        np.testing.assert_array_equal(crop.valid > 0.5, expected)
+        np.testing.assert_allclose(crop.pixels, 100, atol=1e-3)
+        assert inner.valid.min() == 1
 
 
 def test_colours_that_are_cut_off_do_not_tell() -> None:
     pixels = frame()
     pixels[100:132, 120:152, 1] = 255
-    for view in cut(pixels):
-        scale = view.focal / CAMERA.focal_px
-        lost = (1 - view.inside).sum() / scale**2
+    for crop in cut(pixels):
+        scale = crop.focal / CAMERA.focal_px
+        lost = (1 - crop.valid).sum() / scale**2
         assert lost == pytest.approx(32 * 32, rel=0.02)
-        assert view.pixels[view.inside == 1].max() == pytest.approx(100, abs=1e-3)
+        assert crop.pixels[crop.valid == 1].max() == pytest.approx(100, abs=1e-3)

@@ -14,11 +14,11 @@ def textures(side: int) -> list[Array]:
 
 
 def test_luma_of_every_texture_side_by_side() -> None:
-    pictures = textures(64)
-    grey = grey_pyramids(build_pyramids(pictures))
+    image_pair = textures(64)
+    grey = grey_pyramids(build_pyramids(image_pair))
     assert grey.dropped == 0
     finest = grey.texels[: 64 * 64].reshape(64, 64, 3) / STEPS
-    expected = np.stack([picture @ np.array(LUMA) for picture in pictures], axis=2)
+    expected = np.stack([picture @ np.array(LUMA) for picture in image_pair], axis=2)
     np.testing.assert_allclose(finest, expected, atol=0.6 / STEPS)
 
 

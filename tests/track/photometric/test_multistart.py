@@ -6,11 +6,11 @@ import numpy as np
 
 import patterned
 from mien.track.face_model import FaceParameters
-from mien.track.parameters import Guess
+from mien.track.parameters import Parameters
 from mien.track.photometric.multistart import better_start
 
 NEUTRAL = patterned.model().neutral
-START = Guess(patterned.pose(), NEUTRAL)
+START = Parameters(patterned.pose(), NEUTRAL)
 
 
 def expression(region: str, name: str) -> FaceParameters:
@@ -22,14 +22,14 @@ def expression(region: str, name: str) -> FaceParameters:
 
 
 def test_no_other_start_where_all_is_explained() -> None:
-    scene = patterned.scene(START)
-    assert better_start(scene, START, scene.pictures(START)) is None
+    level = patterned.level(START)
+    assert better_start(level, START, level.image_pair(START)) is None
 
 
 def test_a_mouth_that_jumped_is_found_by_itself() -> None:
-    true = Guess(START.pose, expression("mouth", "anger"))
-    scene = patterned.scene(true)
-    found = better_start(scene, START, scene.pictures(START))
+    true = Parameters(START.pose, expression("mouth", "anger"))
+    level = patterned.level(true)
+    found = better_start(level, START, level.image_pair(START))
     assert found is not None
     weights = patterned.model().weights(found.face)
     np.testing.assert_allclose(weights[0], [0, 0, 1], atol=1e-9)
@@ -38,8 +38,8 @@ def test_a_mouth_that_jumped_is_found_by_itself() -> None:
 
 
 def test_closed_lids_are_found() -> None:
-    true = Guess(START.pose, replace(NEUTRAL, units=np.ones(2)))
-    scene = patterned.scene(true)
-    found = better_start(scene, START, scene.pictures(START))
+    true = Parameters(START.pose, replace(NEUTRAL, units=np.ones(2)))
+    level = patterned.level(true)
+    found = better_start(level, START, level.image_pair(START))
     assert found is not None
     assert found.face.units.tolist() == [1, 1]

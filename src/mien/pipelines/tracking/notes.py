@@ -15,7 +15,7 @@ from mien.errors import EstimationError
 from mien.head import Head
 from mien.pipelines.head_in_photo import UNLIKE
 from mien.track.state import Track, TrackedFrame
-from mien.track.tracker import STRANGE_RMS
+from mien.track.tracker import MISMATCH_RMS
 
 _OTHER_FACES = (
     "faces were there, none like the head's: another person's, covered, or in other light"
@@ -40,7 +40,7 @@ def track_notes(track: Track, head: Head, *, met_others: bool) -> list[str]:
     if cut:
         notes.append(f"the edge cuts the face in {_counted(cut, track)}; outside is a guess")
     errors = [frame.rms for frame in track.frames if frame.state is not None]
-    if errors and median(errors) > STRANGE_RMS:
+    if errors and median(errors) > MISMATCH_RMS:
         notes.append(f"{UNLIKE}: error {median(errors):.0f} grey levels, usual are 2 to 13")
     return notes
 

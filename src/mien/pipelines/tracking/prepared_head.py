@@ -13,7 +13,7 @@ from mien.capture.video.frames_ahead import frames_ahead
 from mien.capture.video.video import Video, VideoInfo
 from mien.head import Head
 from mien.progress import Progress
-from mien.track.face_model import TrackedFace
+from mien.track.face_model import FaceModel
 from mien.track.landmarks.focal import estimate_focal
 from mien.track.landmarks.initialization import HeadDetector
 from mien.track.lens import expected_focal
@@ -40,13 +40,13 @@ class PreparedHead:
     options: TrackOptions
 
     @cached_property
-    def model(self) -> TrackedFace:
+    def model(self) -> FaceModel:
         """What is compared with pictures.
 
         Raises:
-            InputError: as TrackedFace.
+            InputError: as FaceModel.
         """
-        return TrackedFace(self.head, units=self.options.units)
+        return FaceModel(self.head, units=self.options.units)
 
     @cached_property
     def head_detector(self) -> HeadDetector:

@@ -1,8 +1,8 @@
-"""Band-pass filtered pictures of a face: another camera's colours drop out.
+"""Band-pass filtered pictures of a face, which depend less on lighting and on the camera's colours.
 
-At one level of a pyramid, a picture less its own blur: what is finer than the level's pixels is
-gone already, what is coarser than the blur goes here. Only the face's own pixels are averaged, so
-that nothing of the background, or of a hand before the face, gets in.
+A picture of one pyramid level less its own blur: the level holds nothing finer than its pixels, and
+the difference removes what is coarser than the blur. Means are taken over the face's own pixels, so
+that neither the background nor a hand before the face changes them.
 
 Source:
     [Pighin 2002] sec. 6.2.
@@ -17,7 +17,7 @@ from mien.numeric.kernels.jit import njit
 from mien.numeric.kernels.threads import for_row_bands
 
 _PARTS = 2
-"""In which a picture is filtered, each with the rows around it that its means take in."""
+"""In which a picture is filtered, each with the rows around it that its means need."""
 
 
 def band_pass(
@@ -30,17 +30,21 @@ def band_pass(
 ) -> tuple[Float[Array, "h w k"], Float[Array, "h w"], Float[Array, "h w"]]:
     """Layers, their mixture and the target, less their means over the pixels around.
 
-    The mixture is filtered itself, for where weights vary, mixed bands are no bands of a mixture.
+    The mixture is filtered itself: where blending weights vary, a mixture of filtered layers is
+    something else.
 
     Args:
-        mask: (h, w) 0 or 1; outside, the bands are 0, but for the target's: that goes on as far as
-            there are means.
+        layers: (h, w, K) one picture for each expression.
+        luma: (h, w) their mixture.
+        target: (h, w) of the frame.
+        mask: (h, w) 0 or 1. Outside, the results are 0, except the target's, which extends as far
+            as there are means.
         weights: (h, w) of pixels in the means.
-        width: px, odd, side of the square whose mean goes.
+        width: px, odd, side of the square over which means are taken.
     """
     import cv2
 
-    # At the outline a frame's pixel mixes the face with what is behind it.
+    # At the outline a pixel of the frame mixes the face with what is behind it.
     inner = cv2.erode(mask, np.ones((3, 3), np.uint8))
     inner *= weights
     inputs = (layers, luma, target)
@@ -100,18 +104,18 @@ def _subtract_rows(
     for own in range(len(sums)):
         row = first + own
         for col in range(mask.shape[1]):
-            share = sums[own, col, count + 2]
-            shown = mask[row, col] > 0.0 and share > smallest
+            total = sums[own, col, count + 2]
+            shown = mask[row, col] > 0.0 and total > smallest
             # Outside everything is 0: a picture and its mean alike.
-            inverse = np.float32(1.0) / share if shown else np.float32(0.0)
+            inverse = np.float32(1.0) / total if shown else np.float32(0.0)
             keep = np.float32(1.0) if shown else np.float32(0.0)
             for n in range(count):
                 mean = sums[own, col, n] * inverse
                 layer_bands[row, col, n] = keep * layers[row, col, n] - mean
             luma_band[row, col] = keep * luma[row, col] - sums[own, col, count] * inverse
             target_band[row, col] = 0.0
-            if share > smallest:
-                target_band[row, col] = target[row, col] - sums[own, col, count + 1] / share
+            if total > smallest:
+                target_band[row, col] = target[row, col] - sums[own, col, count + 1] / total
 
 
 def odd(width: float) -> int:

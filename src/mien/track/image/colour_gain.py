@@ -1,4 +1,4 @@
-"""Another camera's colours: gain and bias of every frame."""
+"""Gain and bias between the colours of a frame and those of the drawn face."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from mien.arrays import Array, Float
 from mien.track.image.greyscale import LUMA
 
 _GAIN_SD = 0.3
-"""How far a camera's gain is from 1."""
-_SAY = 200.0
-"""How many independent observations a face's pixels are."""
+"""Standard deviation of a camera's gain around 1."""
+_EFFECTIVE_OBSERVATIONS = 200.0
+"""How many independent observations a face's pixels are worth."""
 
 
 @dataclass(frozen=True)
-class Colours:
-    """How a frame's colours come from the drawn ones: frame = gain * drawn + bias, 0 to 255.
+class ColourGain:
+    """A frame's colours from the drawn ones: frame = gain * drawn + bias, 0 to 255.
 
     Attributes:
         gain: (3,).
@@ -27,35 +27,40 @@ class Colours:
     gain: Float[Array, " 3"] = field(default_factory=lambda: np.ones(3))
     bias: Float[Array, " 3"] = field(default_factory=lambda: np.zeros(3))
 
-    def towards(self, other: Colours, share: float) -> Colours:
-        """A part of the way to others."""
-        gain = self.gain + share * (other.gain - self.gain)
-        return Colours(gain, self.bias + share * (other.bias - self.bias))
+    def towards(self, other: ColourGain, fraction: float) -> ColourGain:
+        """Linear interpolation: 0 is this one, 1 the other."""
+        gain = self.gain + fraction * (other.gain - self.gain)
+        return ColourGain(gain, self.bias + fraction * (other.bias - self.bias))
 
     def applied(self, drawn: Float[Array, "h w 3"]) -> Float[Array, "h w 3"]:
-        """The drawn picture as the frame would have it."""
+        """A drawn picture in the frame's colours."""
         return np.asarray(drawn * self.gain + self.bias, np.float32)
 
-    def luma_before(self, pixels: Float[Array, "h w 3"]) -> Float[Array, "h w"]:
-        """Luma of a frame as the drawn picture would have it."""
+    def corrected_luma(self, pixels: Float[Array, "h w 3"]) -> Float[Array, "h w"]:
+        """Luma of a frame in the colours of the drawn picture."""
         import cv2
 
-        shares = np.array(LUMA) / self.gain
-        constant = float(shares @ self.bias)
-        luma = cv2.transform(pixels, np.array([[*shares, -constant]]))
+        coefficients = np.array(LUMA) / self.gain
+        constant = float(coefficients @ self.bias)
+        luma = cv2.transform(pixels, np.array([[*coefficients, -constant]]))
         return np.asarray(luma, np.float32)
 
 
-def match_colours(
+def estimate_colour_gain(
     drawn: Float[Array, "h w 3"], target: Float[Array, "h w 3"], weights: Float[Array, "h w"]
-) -> Colours:
-    """Gain and bias of least squares.
+) -> ColourGain:
+    """Gain and bias by weighted least squares, with a prior that gains are near 1.
 
-    A plain face hardly tells one from the other: gains are believed to be near 1.
+    Without the prior a face of little contrast would not determine both.
+
+    Args:
+        drawn: 0 to 255.
+        target: of the frame, 0 to 255.
+        weights: of the pixels.
     """
     chosen = weights > 0
     if not chosen.any():
-        return Colours()
+        return ColourGain()
     w = weights[chosen].astype(np.float64)
     x, y = drawn[chosen].astype(np.float64), target[chosen].astype(np.float64)
     total = max(float(w.sum()), 1e-9)
@@ -63,7 +68,7 @@ def match_colours(
     dx, dy = x - mean_x, y - mean_y
     variance = np.maximum(w @ (dx * dx), 1e-9)
     noise = np.maximum(w @ (dy - dx) ** 2 / total, 1.0)
-    belief = noise / _GAIN_SD**2 * total / _SAY
-    gain = (w @ (dx * dy) + belief) / (variance + belief)
+    prior = noise / _GAIN_SD**2 * total / _EFFECTIVE_OBSERVATIONS
+    gain = (w @ (dx * dy) + prior) / (variance + prior)
     gain = np.clip(gain, 0.2, 5.0)
-    return Colours(gain, mean_y - gain * mean_x)
+    return ColourGain(gain, mean_y - gain * mean_x)

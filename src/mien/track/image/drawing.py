@@ -1,4 +1,4 @@
-"""The face drawn for comparison: every expression's picture, pixel by pixel.
+"""The face rendered for comparison with a frame: one picture for each expression, and the mixture.
 
 Source:
     [Pighin 2002] eq. 5.
@@ -18,11 +18,11 @@ from mien.numeric.raster.rasterizer import Raster, empty_raster, rasterize_rows
 from mien.render.mipmap import Four, Pyramids, level_of_detail, place_lookup, weighted_texels
 from mien.render.multitexture import TexturedMesh
 from mien.rig.state import PosedFace
-from mien.track.image.frame_pyramid import View
+from mien.track.image.frame_pyramid import FrameCrop, Intrinsics
 from mien.track.image.greyscale import GreyPyramids, add_greys
 
 _Corners = tuple[int, int, int]
-_Shares = tuple[float, float, float]
+_Barycentrics = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Pose:
     Attributes:
         R: (3, 3) R_cam_head.
         t: (3,) mm, t_cam_head.
-        zoom: the lens's focal length over that of the views.
+        zoom: focal length over that of the crops it is drawn for.
     """
 
     R: Float[Array, "3 3"]
@@ -40,32 +40,23 @@ class Pose:
     zoom: float = 1.0
 
 
-Lens = tuple[float, float, float]
-"""Focal length and principal point, px."""
-
-
-def lens_of(view: View, pose: Pose) -> Lens:
-    """Of a view, as the pose zooms it."""
-    return float(view.focal * pose.zoom), float(view.cx), float(view.cy)
-
-
 class Drawing(NamedTuple):
-    """What a view shows of the model.
+    """The model, rendered for one crop of a frame.
 
     Attributes:
         ids: (h, w) triangles, -1 where there is none that is compared.
         barycentrics: (h, w, 3).
         depth: (h, w) mm.
-        places: (V, 3) mm, camera space.
+        positions: (V, 3) mm, of the vertices in camera space.
         mask: (h, w) float32, 1 where there is a triangle that is compared.
-        layers: (h, w, K) float32, 0 to 255: luma of each expression's rendering, on one geometry.
+        layers: (h, w, K) float32, 0 to 255: luma of each expression's texture, on one geometry.
         luma: (h, w) float32: of their mixture, [Pighin 2002] eq. (5).
     """
 
     ids: Int[Array, "h w"]
     barycentrics: Float[Array, "h w 3"]
     depth: Float[Array, "h w"]
-    places: Float[Array, "v 3"]
+    positions: Float[Array, "v 3"]
     mask: Float[Array, "h w"]
     layers: Float[Array, "h w k"]
     luma: Float[Array, "h w"]
@@ -77,48 +68,53 @@ def draw(
     compared: Bool[Array, " f"],
     face: PosedFace,
     pose: Pose,
-    view: View,
+    crop: FrameCrop,
     *,
     layers: bool = True,
 ) -> Drawing:
-    """The face as the view sees it, in shades of grey.
+    """The face in shades of grey, at the crop's size.
 
     Args:
-        grey: of the painted textures.
+        painted: triangles and their textures.
+        grey: the same textures in grey.
+        compared: which triangles are compared with the frame.
+        face: its vertices, blending weights and brightness.
+        pose: of the head.
+        crop: gives size and intrinsics.
         layers: keep every expression's rendering; otherwise there are 0 of them.
     """
-    scene = _placed(painted, compared, face, pose, view)
-    ids, barycentrics = scene.raster.triangle_ids, scene.raster.barycentrics
+    projected = _projected(painted, compared, face, pose, crop)
+    ids, barycentrics = projected.raster.triangle_ids, projected.raster.barycentrics
     count = face.weights.shape[1] if layers else 0
     out, luma = np.empty((*ids.shape, count), np.float32), np.empty(ids.shape, np.float32)
     mask = np.empty(ids.shape, np.float32)
 
     def rows(first: int, end: int) -> None:
-        scene.cover(first, end)
-        _shade_rows(ids, barycentrics, scene.surface, grey, first, end, mask, out, luma)
+        projected.rasterize(first, end)
+        _shade_rows(ids, barycentrics, projected.surface, grey, first, end, mask, out, luma)
 
-    for_row_bands(rows, len(ids), work=scene.work)
-    return Drawing(ids, barycentrics, scene.raster.depth, scene.places, mask, out, luma)
+    for_row_bands(rows, len(ids), work=projected.work)
+    return Drawing(ids, barycentrics, projected.raster.depth, projected.positions, mask, out, luma)
 
 
 def draw_colours(
-    painted: TexturedMesh, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, view: View
+    painted: TexturedMesh, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, crop: FrameCrop
 ) -> tuple[Float[Array, "h w 3"], Float[Array, "h w"]]:
-    """The mixture in colour, 0 to 255, and where it is one of the compared triangles."""
-    scene = _placed(painted, compared, face, pose, view)
-    ids, barycentrics = scene.raster.triangle_ids, scene.raster.barycentrics
+    """The mixture in colour, 0 to 255, and a mask of the compared triangles."""
+    projected = _projected(painted, compared, face, pose, crop)
+    ids, barycentrics = projected.raster.triangle_ids, projected.raster.barycentrics
     out, mask = np.empty((*ids.shape, 3), np.float32), np.empty(ids.shape, np.float32)
 
     def rows(first: int, end: int) -> None:
-        scene.cover(first, end)
-        _colour_rows(ids, barycentrics, scene.surface, painted.pyramids, first, end, mask, out)
+        projected.rasterize(first, end)
+        _colour_rows(ids, barycentrics, projected.surface, painted.pyramids, first, end, mask, out)
 
-    for_row_bands(rows, len(ids), work=scene.work)
+    for_row_bands(rows, len(ids), work=projected.work)
     return out, mask
 
 
 class _Surface(NamedTuple):
-    """What triangles look like.
+    """Triangles and what shading needs of them.
 
     Attributes:
         compared: (F,) bool.
@@ -134,88 +130,95 @@ class _Surface(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Placed:
+class _Projected:
     """A face in front of a camera.
 
     Attributes:
         surface: of its triangles.
-        places: (V, 3) mm, camera space.
+        positions: (V, 3) mm, camera space.
         points: (V, 2) px.
         depth: (V,) mm.
-        raster: what covers the pixels, where `cover` has been.
+        raster: triangles by pixel, in the rows that `rasterize` has filled in.
     """
 
     surface: _Surface
-    places: Float[Array, "v 3"]
+    positions: Float[Array, "v 3"]
     points: Float[Array, "v 2"]
     depth: Float[Array, " v"]
     raster: Raster
 
     @property
     def work(self) -> int:
-        """About how many pixels it costs to cover and shade all rows (numeric.kernels.threads)."""
+        """Cost of all rows, in pixels (numeric.kernels.threads)."""
         return 2 * len(self.surface.triangles) + 3 * self.raster.triangle_ids.size
 
-    def cover(self, first: int, end: int) -> None:
+    def rasterize(self, first: int, end: int) -> None:
         """Fill in rows of the raster."""
         mesh, raster = (self.points, self.depth, self.surface.triangles), self.raster
         outputs = (raster.triangle_ids, raster.barycentrics, raster.depth)
         rasterize_rows(*mesh, True, first, end, *outputs)
 
 
-def _placed(
-    painted: TexturedMesh, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, view: View
-) -> _Placed:
-    """The face in front of the view's camera, no pixel covered yet."""
+def _projected(
+    painted: TexturedMesh, compared: Bool[Array, " f"], face: PosedFace, pose: Pose, crop: FrameCrop
+) -> _Projected:
+    """The face in front of the crop's camera, not rasterized yet."""
     count, textures = face.weights.shape
-    places, points, depth = np.empty((count, 3)), np.empty((count, 2)), np.empty(count)
+    positions, points, depth = np.empty((count, 3)), np.empty((count, 2)), np.empty(count)
     motion = np.empty((3, 4))
     motion[:, :3], motion[:, 3] = pose.R, pose.t
-    lens = lens_of(view, pose)
+    intrinsics = crop.intrinsics(pose.zoom)
     shades = np.empty((count, 2 + textures), np.float32)
-    seen = (face.vertices, face.brightness, face.weights)
-    _place_vertices(*seen, motion, lens, places, points, depth, shades)
+    inputs = (face.vertices, face.brightness, face.weights)
+    _project_vertices(*inputs, motion, intrinsics, positions, points, depth, shades)
     # As sharp as a picture of four samples a pixel (render.multitexture).
     shades[:, 0] = level_of_detail(painted.texels, points, painted.triangles) - 0.5
     surface = _Surface(compared, painted.triangles, painted.uvs, shades)
-    return _Placed(surface, places, frozen(points), frozen(depth), empty_raster(*view.size))
+    return _Projected(surface, positions, frozen(points), frozen(depth), empty_raster(*crop.size))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _place_vertices(
+def _project_vertices(
     vertices: Array,
     brightness: Array,
     weights: Array,
     motion: Array,
-    lens: Lens,
-    places: Array,
+    intrinsics: Intrinsics,
+    positions: Array,
     points: Array,
     depth: Array,
     shades: Array,
 ) -> None:
-    """Fill in vertices in camera space, where they are seen, and shades but for their detail.
+    """Fill in vertices in camera space, their projections, and shades but for the level of detail.
 
     Args:
+        vertices: (V, 3) mm, head space.
+        brightness: (V,).
+        weights: (V, K) of the textures.
         motion: (3, 4) from head to camera space.
-        lens: focal length and principal point, px.
+        intrinsics: of the camera.
+        positions: (V, 3) mm, camera space; filled in.
+        points: (V, 2) px; filled in.
+        depth: (V,) mm; filled in.
+        shades: of _Surface; filled in but for the first column.
     """
-    focal, cx, cy = lens
+    focal, cx, cy = intrinsics
     for v in range(len(vertices)):
         x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
         for axis in range(3):
             m = motion[axis]
-            places[v, axis] = m[0] * x + m[1] * y + m[2] * z + m[3]
-        depth[v] = places[v, 2]
-        points[v, 0] = focal * places[v, 0] / depth[v] + cx
-        points[v, 1] = focal * places[v, 1] / depth[v] + cy
+            positions[v, axis] = m[0] * x + m[1] * y + m[2] * z + m[3]
+        depth[v] = positions[v, 2]
+        points[v, 0] = focal * positions[v, 0] / depth[v] + cx
+        points[v, 1] = focal * positions[v, 1] / depth[v] + cy
         shades[v, 1] = brightness[v]
         for n in range(weights.shape[1]):
             shades[v, 2 + n] = weights[v, n]
 
 
 @njit(inline="always")
-def _between(shades: Array, corners: _Corners, b: _Shares, column: int) -> float:
-    """One of the shades at a place in a triangle."""
+def _interpolated(shades: Array, corners: _Corners, b: _Barycentrics, column: int) -> float:
+    """One column of the shades, interpolated in a triangle."""
     i, j, k = corners
     return b[0] * shades[i, column] + b[1] * shades[j, column] + b[2] * shades[k, column]
 
@@ -225,17 +228,17 @@ def _lookup(
     surface: _Surface,
     t: int,
     corners: _Corners,
-    b: _Shares,
+    b: _Barycentrics,
     pyramids: Pyramids | GreyPyramids,
     dropped: int,
 ) -> tuple[Four, Four, float]:
-    """Texels and their weights for a place in a triangle, and its brightness."""
+    """Texels and their weights for a point in a triangle, and its brightness."""
     uvs, shades = surface.uvs, surface.shades
     u = b[0] * uvs[t, 0, 0] + b[1] * uvs[t, 1, 0] + b[2] * uvs[t, 2, 0]
     v = b[0] * uvs[t, 0, 1] + b[1] * uvs[t, 1, 1] + b[2] * uvs[t, 2, 1]
-    level = _between(shades, corners, b, 0)
+    level = _interpolated(shades, corners, b, 0)
     fine, coarse = place_lookup(pyramids, u, v, level - dropped)
-    return fine, coarse, _between(shades, corners, b, 1)
+    return fine, coarse, _interpolated(shades, corners, b, 1)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
@@ -267,7 +270,7 @@ def _shade_rows(
             add_greys(grey.texels, fine, coarse, greys)
             total = np.float32(0.0)
             for n in range(len(greys)):
-                total += _between(surface.shades, corners, b, 2 + n) * greys[n]
+                total += _interpolated(surface.shades, corners, b, 2 + n) * greys[n]
             for n in range(layers.shape[2]):
                 layers[row, col, n] = bright * greys[n]
             luma[row, col] = bright * total
@@ -297,7 +300,7 @@ def _colour_rows(
             corners = surface.triangles[t, 0], surface.triangles[t, 1], surface.triangles[t, 2]
             fine, coarse, bright = _lookup(surface, t, corners, b, pyramids, 0)
             for n in range(len(pyramids.texels)):
-                weight = bright * _between(surface.shades, corners, b, 2 + n)
+                weight = bright * _interpolated(surface.shades, corners, b, 2 + n)
                 if weight != 0.0:
                     red, green, blue = weighted_texels(pyramids.texels, n, fine, coarse)
                     out[row, col, 0] += weight * red

@@ -1,9 +1,10 @@
-"""A frame as the tracker sees it: cut out around the face, at several sizes."""
+"""Image pyramid of a frame, cropped around the face."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,26 +14,42 @@ from mien.camera import Camera
 _MARGIN = 0.15
 """Of the face's extent, on every side: as far as it may move between two frames."""
 BRIGHTEST = 253
-"""Of a colour that is certain not to be cut off."""
+"""Colour values above this may be saturated."""
 
 
-@dataclass(frozen=True)
-class View:
-    """One size of the cut-out.
+class Intrinsics(NamedTuple):
+    """Focal length and principal point, px."""
 
-    Attributes:
-        pixels: (h, w, 3) float32, 0 to 255.
-        inside: (h, w) float32, 1 where the frame has a pixel that tells how bright the face is.
-        focal: px of this size; the principal point from the cut-out's corner.
-        cx: px of this size; the principal point from the cut-out's corner.
-        cy: px of this size; the principal point from the cut-out's corner.
-    """
-
-    pixels: Float[Array, "h w 3"]
-    inside: Float[Array, "h w"]
     focal: float
     cx: float
     cy: float
+
+
+@dataclass(frozen=True)
+class FrameCrop:
+    """The part of a frame around the face, at one level of the pyramid.
+
+    Attributes:
+        pixels: (h, w, 3) float32, 0 to 255.
+        valid: (h, w) float32, 1 where the frame has a pixel that is not saturated.
+        focal: px of this level.
+        cx: px of this level, the principal point from the crop's corner.
+        cy: px of this level, the principal point from the crop's corner.
+    """
+
+    pixels: Float[Array, "h w 3"]
+    valid: Float[Array, "h w"]
+    focal: float
+    cx: float
+    cy: float
+
+    def intrinsics(self, zoom: float) -> Intrinsics:
+        """Of this level.
+
+        Args:
+            zoom: focal length over that of the crop, as Pose's.
+        """
+        return Intrinsics(float(self.focal * zoom), float(self.cx), float(self.cy))
 
     @property
     def size(self) -> tuple[int, int]:
@@ -40,22 +57,23 @@ class View:
         return self.pixels.shape[1], self.pixels.shape[0]
 
 
-def cut_views(
+def crop_pyramid(
     pixels: UInt8[Array, "h w 3"],
     camera: Camera,
     points: Float[Array, "n 2"],
     *,
     face_px: float,
     levels: int,
-) -> list[View]:
-    """The part of a frame around a face, the finest size first, each half of that before.
+) -> list[FrameCrop]:
+    """The part of a frame around a face, the finest level first, each half the size of the last.
 
     Args:
+        pixels: of the whole frame.
         camera: of the frame's own pixels.
-        points: (N, 2) px where the face is thought to be.
-        face_px: extent at which a face is compared, give or take a factor of sqrt(2); a smaller one
-            stays as it is.
-        levels: how many sizes.
+        points: (N, 2) px of the face, where it is expected.
+        face_px: extent of the face in the finest level, within a factor of sqrt(2); a smaller face
+            is not enlarged.
+        levels: how many.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     extent = float((high - low).max())
@@ -65,32 +83,30 @@ def cut_views(
     multiple = 2 ** (halvings + levels - 1)
     origin = np.floor((low - margin) / multiple).astype(int) * multiple
     side = np.ceil((high + margin - origin) / multiple).astype(int) * multiple
-    cut, inside = _cut(pixels, origin, side)
-    views = []
+    part, valid = _crop(pixels, origin, side)
+    crops = []
     for level in range(levels):
         scale = 0.5 ** (halvings + level)
         cx, cy = (camera.principal - origin) * scale
         size = (round(side[0] * scale), round(side[1] * scale))
-        cut, inside = _reduced(cut, size), _reduced(inside, size)
+        part, valid = _reduced(part, size), _reduced(valid, size)
         focal = camera.focal_px * scale
-        views.append(View(cut, inside, focal, float(cx), float(cy)))
-    return views
+        crops.append(FrameCrop(part, valid, focal, float(cx), float(cy)))
+    return crops
 
 
 def _halvings(extent: float, wanted: float) -> int:
     """How often to halve an extent until it is at most sqrt(2) times the one wanted.
 
-    A scale that followed the face would move every pixel's grid, and one that is no whole number
-    of pixels would blur unevenly.
+    A scale that follows the face would resample every frame on another grid.
     """
     return max(0, math.ceil(math.log2(max(extent, 1.0) / wanted) - 0.5))
 
 
-def _cut(pixels: Array, origin: Array, side: Array) -> tuple[Array, Array]:
-    """The part of the frame, its last pixels repeated beyond its borders, and where it tells.
+def _crop(pixels: Array, origin: Array, side: Array) -> tuple[Array, Array]:
+    """The part of the frame, its border pixels repeated beyond its borders, and a validity mask.
 
-    Beyond the borders it does not, nor where a colour is as bright as it can be: how bright the
-    face is there is not known.
+    Pixels beyond the borders and saturated ones are not valid.
     """
     import cv2
 
@@ -100,10 +116,10 @@ def _cut(pixels: Array, origin: Array, side: Array) -> tuple[Array, Array]:
     part = pixels[low[1] : high[1], low[0] : high[0]]
     before, after = low - origin, origin + side - high
     around = (before[1], after[1], before[0], after[0])
-    told = cv2.inRange(part, (0, 0, 0), (BRIGHTEST,) * 3)
-    cut = cv2.copyMakeBorder(part, *around, cv2.BORDER_REPLICATE)
-    inside = cv2.copyMakeBorder(told, *around, cv2.BORDER_CONSTANT, value=0)
-    return cut.astype(np.float32), inside.astype(np.float32) / 255
+    unsaturated = cv2.inRange(part, (0, 0, 0), (BRIGHTEST,) * 3)
+    padded = cv2.copyMakeBorder(part, *around, cv2.BORDER_REPLICATE)
+    valid = cv2.copyMakeBorder(unsaturated, *around, cv2.BORDER_CONSTANT, value=0)
+    return padded.astype(np.float32), valid.astype(np.float32) / 255
 
 
 def _reduced(image: Array, size: tuple[int, int]) -> Array:

@@ -1,4 +1,7 @@
-"""One size of a frame beside the face as guessed: drawn once, then moved to guesses near by."""
+"""The photometric residual of one pyramid level, linearized around given parameters.
+
+The face is drawn once, at these parameters, and warped to others near by.
+"""
 
 from __future__ import annotations
 
@@ -12,21 +15,27 @@ import numpy as np
 from mien.arrays import Array, Float, Int
 from mien.numeric.kernels.jit import njit
 from mien.numeric.kernels.threads import for_row_bands
-from mien.track.face_model import Anchor, TrackedFace
+from mien.track.face_model import Anchor, FaceModel
 from mien.track.image.bandpass import band_pass, odd
-from mien.track.image.drawing import Drawing, Lens, draw, lens_of
-from mien.track.image.frame_pyramid import View
-from mien.track.parameters import Guess
-from mien.track.photometric.image_jacobian import POSE_UNKNOWNS, Flows, screen_flows
-from mien.track.photometric.normal_equations import Equations, sum_up
-from mien.track.photometric.samples import Answers, Moved, Samples, look_up, take_samples
+from mien.track.image.drawing import Drawing, draw
+from mien.track.image.frame_pyramid import FrameCrop, Intrinsics
+from mien.track.parameters import Parameters
+from mien.track.photometric.image_jacobian import POSE_UNKNOWNS, ImageJacobian, image_jacobian
+from mien.track.photometric.normal_equations import NormalEquations, accumulate_normal_equations
+from mien.track.photometric.samples import (
+    ParameterSupport,
+    Samples,
+    Warp,
+    sample_bicubic,
+    take_samples,
+)
 
 BAND = 0.2
-"""Width of the widest structures that expressions are told by, over the face's."""
+"""Width of the widest structures that are compared for expressions, over the face's."""
 
 
-class Pictures(NamedTuple):
-    """Plain luma of face and frame, where a drawing shows the face.
+class ImagePair(NamedTuple):
+    """Plain luma of the drawn face and the frame.
 
     Attributes:
         ids: (h, w) triangles, -1 for none.
@@ -46,144 +55,159 @@ Compared = tuple[Float[Array, "h w k"], Float[Array, "h w"], Float[Array, "h w"]
 
 
 @dataclass(frozen=True)
-class Scene:
-    """One size of a frame, and all that a phase takes as given.
+class PyramidLevel:
+    """One level of a frame's pyramid, and all that stays constant while it is solved.
 
     Attributes:
+        model: the head.
         anchor: the face around which the model is linear.
-        target: (h, w) float32 luma of the frame, as the colours of the head's photos would be.
+        crop: the frame at this level.
+        target: (h, w) float32 luma of the frame, in the colours of the head's photos.
         weights: (h, w) of the pixels.
-        scale: grey levels by which a pixel may be off and still count.
-        face_px: width of the face in this size.
+        scale: grey levels, of the robust weights (Samples).
+        face_px: width of the face at this level.
     """
 
-    model: TrackedFace
+    model: FaceModel
     anchor: Anchor
-    view: View
+    crop: FrameCrop
     target: Float[Array, "h w"]
     weights: Float[Array, "h w"]
     scale: float
     face_px: float
 
-    def draw(self, guess: Guess, *, layers: bool) -> Drawing:
-        """The face as guessed; with `layers`, every expression's picture apart."""
-        face = self.model.posed(self.anchor, guess.face)
+    def draw(self, parameters: Parameters, *, layers: bool) -> Drawing:
+        """The face with these parameters; with `layers`, every expression's picture apart."""
+        face = self.model.posed(self.anchor, parameters.face)
         model = self.model
         return draw(
             model.painted,
             model.grey,
             model.compared,
             face,
-            guess.pose,
-            self.view,
+            parameters.pose,
+            self.crop,
             layers=layers,
         )
 
-    def pictures(self, guess: Guess) -> Pictures:
-        """Face and frame, drawn for this guess."""
-        drawing = self.draw(guess, layers=False)
-        return Pictures(drawing.ids, drawing.mask, drawing.luma, self.target)
+    def image_pair(self, parameters: Parameters) -> ImagePair:
+        """Face and frame, drawn for these parameters."""
+        drawing = self.draw(parameters, layers=False)
+        return ImagePair(drawing.ids, drawing.mask, drawing.luma, self.target)
 
 
-class Look(Protocol):
-    """A scene around one guess."""
-
-    @property
-    def scene(self) -> Scene:
-        """What is looked at."""
+class Linearization(Protocol):
+    """The residual of a level, linearized around parameters."""
 
     @property
-    def guess(self) -> Guess:
-        """For which the face was drawn."""
+    def level(self) -> PyramidLevel:
+        """Whose residual it is."""
 
-    def equations(self, guess: Guess) -> Equations:
-        """Of all unknowns, at a guess near by."""
+    @property
+    def parameters(self) -> Parameters:
+        """Around which it is linear: the face was drawn with them."""
 
-    def pictures(self, guess: Guess) -> Pictures:
-        """As the guess has them."""
+    def normal_equations(self, parameters: Parameters) -> NormalEquations:
+        """Of all unknowns, at parameters near by."""
 
-
-Linearize = Callable[[Scene, Guess], Look]
-
-
-def by_plain_pictures(scene: Scene, guess: Guess) -> Look:
-    """Equations of the pose alone, analytic; rows of the face's parameters are 0."""
-    drawing = scene.draw(guess, layers=False)
-    shown = (drawing.layers, drawing.luma, scene.target)
-    return _Sampled.of(scene, guess, drawing, shown, scene.model.pose_answers)
+    def image_pair(self, parameters: Parameters) -> ImagePair:
+        """Face and frame at parameters near by."""
 
 
-def by_bands(scene: Scene, guess: Guess) -> Look:
-    """Equations of pose and face, analytic, over band-pass filtered pictures."""
-    drawing = scene.draw(guess, layers=True)
-    return _Sampled.of(scene, guess, drawing, banded(scene, drawing), scene.model.answers)
+Linearizer = Callable[[PyramidLevel, Parameters], Linearization]
 
 
-def banded(scene: Scene, drawing: Drawing) -> Compared:
+def linearize_pose(level: PyramidLevel, parameters: Parameters) -> Linearization:
+    """Analytic, of the pose alone, over plain pictures; rows of the face's parameters are 0."""
+    drawing = level.draw(parameters, layers=False)
+    compared = (drawing.layers, drawing.luma, level.target)
+    return _SampledLinearization.of(level, parameters, drawing, compared, level.model.pose_support)
+
+
+def linearize_pose_and_face(level: PyramidLevel, parameters: Parameters) -> Linearization:
+    """Analytic, of pose and face, over band-pass filtered pictures."""
+    drawing = level.draw(parameters, layers=True)
+    return _SampledLinearization.of(
+        level, parameters, drawing, band_passed(level, drawing), level.model.support
+    )
+
+
+def band_passed(level: PyramidLevel, drawing: Drawing) -> Compared:
     """Layers, their mixture and the target, band-pass filtered."""
-    shown = (drawing.layers, drawing.luma, scene.target)
-    return band_pass(*shown, drawing.mask, scene.weights, odd(BAND * scene.face_px))
+    compared = (drawing.layers, drawing.luma, level.target)
+    return band_pass(*compared, drawing.mask, level.weights, odd(BAND * level.face_px))
 
 
 @dataclass(frozen=True)
-class _Sampled:
-    """A Look at what was drawn for one guess. The Hessian is that guess's, wherever it is taken."""
+class _SampledLinearization:
+    """A Linearization by samples of one drawing. The Hessian stays that of its own parameters."""
 
-    scene: Scene
-    guess: Guess
+    level: PyramidLevel
+    parameters: Parameters
     drawing: Drawing
     samples: Samples
-    answers: Answers
+    support: ParameterSupport
 
     @classmethod
     def of(
-        cls, scene: Scene, guess: Guess, drawing: Drawing, shown: Compared, answers: Answers
+        cls,
+        level: PyramidLevel,
+        parameters: Parameters,
+        drawing: Drawing,
+        compared: Compared,
+        support: ParameterSupport,
     ) -> Self:
-        """Of a drawing as it is compared."""
-        lens = lens_of(scene.view, guess.pose)
-        samples = take_samples(drawing, *shown, scene.weights, answers, lens, scale=scene.scale)
-        return cls(scene, guess, drawing, samples, answers)
+        """From a drawing and the pictures that are compared."""
+        intrinsics = level.crop.intrinsics(parameters.pose.zoom)
+        samples = take_samples(
+            drawing, *compared, level.weights, support, intrinsics, scale=level.scale
+        )
+        return cls(level, parameters, drawing, samples, support)
 
-    def equations(self, guess: Guess) -> Equations:
-        if guess is self.guess:
-            return self._first
-        found = sum_up(self.samples, self._moved(guess), self._flows, self.answers, matrix=False)
-        return replace(self._padded(found), matrix=self._first.matrix)
-
-    @cached_property
-    def _first(self) -> Equations:
-        moved = self._moved(self.guess)
-        return self._padded(sum_up(self.samples, moved, self._flows, self.answers))
+    def normal_equations(self, parameters: Parameters) -> NormalEquations:
+        if parameters is self.parameters:
+            return self._own
+        return replace(self._equations(parameters, matrix=False), matrix=self._own.matrix)
 
     @cached_property
-    def _flows(self) -> Flows:
-        moves = self.scene.model.moves[: len(self.answers.region) - POSE_UNKNOWNS]
-        return screen_flows(moves, self.drawing.places, self.guess.pose, self.scene.view)
+    def _own(self) -> NormalEquations:
+        return self._equations(self.parameters, matrix=True)
 
-    def pictures(self, guess: Guess) -> Pictures:
-        drawing, model = self.drawing, self.scene.model
-        weights = (guess.face.alpha - self.guess.face.alpha) @ model.basis.Q.T
-        vertices = model.posed(self.scene.anchor, guess.face).vertices
-        places = vertices @ guess.pose.R.T + guess.pose.t
-        lens = lens_of(self.scene.view, guess.pose)
+    def _equations(self, parameters: Parameters, *, matrix: bool) -> NormalEquations:
+        inputs = (self.samples, self._warp(parameters), self._jacobian, self.support)
+        return self._padded(accumulate_normal_equations(*inputs, matrix=matrix))
+
+    @cached_property
+    def _jacobian(self) -> ImageJacobian:
+        offsets = self.level.model.offsets[: len(self.support.region) - POSE_UNKNOWNS]
+        return image_jacobian(
+            offsets, self.drawing.positions, self.parameters.pose, self.level.crop
+        )
+
+    def image_pair(self, parameters: Parameters) -> ImagePair:
+        drawing, model = self.drawing, self.level.model
+        weights = (parameters.face.alpha - self.parameters.face.alpha) @ model.basis.Q.T
+        vertices = model.posed(self.level.anchor, parameters.face).vertices
+        positions = vertices @ parameters.pose.R.T + parameters.pose.t
+        intrinsics = self.level.crop.intrinsics(parameters.pose.zoom)
         drawn, target = np.zeros((2, *drawing.ids.shape), np.float32)
-        now = (places, lens, weights.astype(np.float32), self.scene.target)
+        state = (positions, intrinsics, weights.astype(np.float32), self.level.target)
 
         def rows(first: int, end: int) -> None:
-            _picture_rows(drawing, model.answers, *now, first, end, drawn, target)
+            _picture_rows(drawing, model.support, *state, first, end, drawn, target)
 
         for_row_bands(rows, len(drawn), work=2 * drawn.size)
-        return Pictures(drawing.ids, drawing.mask, drawn, target)
+        return ImagePair(drawing.ids, drawing.mask, drawn, target)
 
-    def _moved(self, guess: Guess) -> Moved:
-        before, after = self.guess.pose, guess.pose
-        turn = after.R @ before.R.T
-        lens = lens_of(self.scene.view, after)
-        return Moved(turn, after.t - turn @ before.t, lens, guess.since(self.guess))
+    def _warp(self, parameters: Parameters) -> Warp:
+        before, after = self.parameters.pose, parameters.pose
+        R = after.R @ before.R.T
+        intrinsics = self.level.crop.intrinsics(after.zoom)
+        return Warp(R, after.t - R @ before.t, intrinsics, parameters.minus(self.parameters))
 
-    def _padded(self, found: Equations) -> Equations:
-        """Of all unknowns, where the answers are of the first few only."""
-        few, count = len(found.vector), POSE_UNKNOWNS + len(self.guess.face.vector)
+    def _padded(self, found: NormalEquations) -> NormalEquations:
+        """Normal equations of all unknowns from those of the first ones; the others' rows are 0."""
+        few, count = len(found.vector), POSE_UNKNOWNS + len(self.parameters.face.vector)
         matrix, vector = np.zeros((count, count)), np.zeros(count)
         matrix[:few, :few], vector[:few] = found.matrix, found.vector
         return replace(found, matrix=matrix, vector=vector)
@@ -192,9 +216,9 @@ class _Sampled:
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _picture_rows(
     drawing: Drawing,
-    answers: Answers,
-    places: Array,
-    lens: Lens,
+    support: ParameterSupport,
+    positions: Array,
+    intrinsics: Intrinsics,
     weights: Array,
     plain: Array,
     first: int,
@@ -202,10 +226,10 @@ def _picture_rows(
     drawn: Array,
     target: Array,
 ) -> None:
-    # Unpacked: to look at an array in a tuple, pixel by pixel, takes half as long again.
+    # Unpacked: access to an array in a tuple, pixel by pixel, takes half as long again.
     ids, barycentrics, _, _, _, layers, luma = drawing
-    masks, triangles = answers.masks, answers.triangles
-    focal, cx, cy = lens
+    masks, triangles = support.masks, support.triangles
+    focal, cx, cy = intrinsics
     height, width = plain.shape
     flat = plain.reshape(height * width)
     for row in range(first, end):
@@ -217,12 +241,12 @@ def _picture_rows(
             b = barycentrics[row, col]
             total = luma[row, col]
             for r in range(masks.shape[1]):
-                share = b[0] * masks[i, r] + b[1] * masks[j, r] + b[2] * masks[k, r]
+                weight = b[0] * masks[i, r] + b[1] * masks[j, r] + b[2] * masks[k, r]
                 for n in range(layers.shape[2]):
-                    total += share * weights[r, n] * layers[row, col, n]
+                    total += weight * weights[r, n] * layers[row, col, n]
             drawn[row, col] = total
-            X = b[0] * places[i, 0] + b[1] * places[j, 0] + b[2] * places[k, 0]
-            Y = b[0] * places[i, 1] + b[1] * places[j, 1] + b[2] * places[k, 1]
-            Z = b[0] * places[i, 2] + b[1] * places[j, 2] + b[2] * places[k, 2]
+            X = b[0] * positions[i, 0] + b[1] * positions[j, 0] + b[2] * positions[k, 0]
+            Y = b[0] * positions[i, 1] + b[1] * positions[j, 1] + b[2] * positions[k, 1]
+            Z = b[0] * positions[i, 2] + b[1] * positions[j, 2] + b[2] * positions[k, 2]
             x, y = np.float32(focal * X / Z + cx - 0.5), np.float32(focal * Y / Z + cy - 0.5)
-            target[row, col] = look_up(flat, width, height, x, y)
+            target[row, col] = sample_bicubic(flat, width, height, x, y)

@@ -1,4 +1,4 @@
-"""Another start where descent went into the wrong valley: a blink or a mouth faster than frames."""
+"""Other starts where descent ended in a local minimum: blinks or mouths faster than the frames."""
 
 from __future__ import annotations
 
@@ -8,55 +8,62 @@ from dataclasses import replace
 import numpy as np
 
 from mien.arrays import Array, Float
-from mien.track.face_model import BLINKS, FaceParameters, TrackedFace
-from mien.track.parameters import Guess
-from mien.track.photometric.linearization import Pictures, Scene
+from mien.track.face_model import BLINKS, FaceModel, FaceParameters
+from mien.track.parameters import Parameters
+from mien.track.photometric.linearization import ImagePair, PyramidLevel
 
-_SUSPICIOUS = 12.0
-"""Grey levels of RMS difference in a region from which another start is looked for, ..."""
-_STANDS_OUT = 1.2
-"""... if that is so many times the rest of the face's."""
-_BETTER = 0.9
-"""Of the difference, squared: another start must bring it down to this."""
+_MIN_RMS = 12.0
+"""Grey levels of RMS residual in a region above which other starts are tried, ..."""
+_MIN_RATIO = 1.2
+"""... if it is so many times that of the rest of the face."""
+_MAX_REMAINING = 0.9
+"""Squared residual of another start over that of the solution: at most this to be taken."""
 _ASIDE, _DOWN = 0.4, 0.3
-"""Radians: how far eyes look aside, or down, when they do."""
+"""Radians of gaze that are tried to either side, and down."""
 
 
-def better_start(scene: Scene, guess: Guess, seen: Pictures) -> Guess | None:
-    """A guess that explains a badly explained region clearly better; None: there is none.
+def better_start(level: PyramidLevel, parameters: Parameters, pair: ImagePair) -> Parameters | None:
+    """Parameters that explain a badly explained region clearly better; None if there are none.
 
-    Tried are the photographed expressions, one at a time in the region; in that of the eyes, open
-    and shut lids and looks to the sides.
+    Tried are the photographed expressions, one at a time in the region; in that of the eyes also
+    open and shut lids, and gaze to the sides and down.
+
+    Args:
+        level: that was solved.
+        parameters: of the solution.
+        pair: face and frame at the solution.
     """
-    sums, counts = _region_sums(scene, seen)
+    sums, counts = _region_sums(level, pair)
     errors = sums / np.maximum(counts, 1.0)
     elsewhere = (sums.sum() - sums) / np.maximum(counts.sum() - counts, 1.0)
-    found = _with_calm_eyes(scene, guess, errors)
+    found = _looking_ahead(level, parameters, errors)
     if found is not None:
         return found
-    for region in np.flatnonzero(errors > np.maximum(_SUSPICIOUS**2, _STANDS_OUT**2 * elsewhere)):
-        best = errors[region] * _BETTER
-        for face in _candidates(scene.model, (found or guess).face, int(region)):
-            tried = replace(guess, face=face)
-            sums, counts = _region_sums(scene, scene.pictures(tried))
+    for region in np.flatnonzero(errors > np.maximum(_MIN_RMS**2, _MIN_RATIO**2 * elsewhere)):
+        best = errors[region] * _MAX_REMAINING
+        for face in _candidates(level.model, (found or parameters).face, int(region)):
+            tried = replace(parameters, face=face)
+            sums, counts = _region_sums(level, level.image_pair(tried))
             error = sums[region] / max(counts[region], 1.0)
             if error < best:
                 best, found = error, tried
     return found
 
 
-def _with_calm_eyes(scene: Scene, guess: Guess, errors: Float[Array, " r"]) -> Guess | None:
-    """Straight ahead, where eyes that look aside explain the picture no better."""
-    if np.abs(guess.face.gaze).max() < _ASIDE / 3:
+def _looking_ahead(
+    level: PyramidLevel, parameters: Parameters, errors: Float[Array, " r"]
+) -> Parameters | None:
+    """With the gaze straight ahead, if the gaze found explains the picture no better."""
+    if np.abs(parameters.face.gaze).max() < _ASIDE / 3:
         return None
-    eyes = ["eye" in region for region in scene.model.layout.regions]
-    calm = replace(guess, face=replace(guess.face, gaze=np.zeros(2)))
-    sums, counts = _region_sums(scene, scene.pictures(calm))
+    eyes = ["eye" in region for region in level.model.layout.regions]
+    ahead = replace(parameters, face=replace(parameters.face, gaze=np.zeros(2)))
+    sums, counts = _region_sums(level, level.image_pair(ahead))
     better = (sums / np.maximum(counts, 1.0))[eyes].sum() < errors[eyes].sum()
-    return calm if better else None
+    return ahead if better else None
 
 
-def _candidates(model: TrackedFace, face: FaceParameters, region: int) -> Iterator[FaceParameters]:
+def _candidates(model: FaceModel, face: FaceParameters, region: int) -> Iterator[FaceParameters]:
     eyes = "eye" in model.layout.regions[region]
     opened = _with_eyes(model, face) if eyes else face
     for weights in np.eye(len(model.layout.expressions)):
@@ -70,7 +77,7 @@ def _candidates(model: TrackedFace, face: FaceParameters, region: int) -> Iterat
 
 
 def _with_eyes(
-    model: TrackedFace,
+    model: FaceModel,
     face: FaceParameters,
     *,
     blink: float = 0.0,
@@ -81,12 +88,14 @@ def _with_eyes(
     return replace(face, units=units, gaze=np.array(gaze))
 
 
-def _region_sums(scene: Scene, seen: Pictures) -> tuple[Float[Array, " r"], Float[Array, " r"]]:
-    """(R,) sums of squared differences in each region, and how many pixels they are."""
-    weights = scene.weights * seen.mask
-    squares = weights * (seen.drawn - seen.target) ** 2
-    regions = np.where(seen.mask > 0, scene.model.region_of[seen.ids], -1)
-    inside, count = regions >= 0, len(scene.model.layout.regions)
+def _region_sums(
+    level: PyramidLevel, pair: ImagePair
+) -> tuple[Float[Array, " r"], Float[Array, " r"]]:
+    """(R,) sums of squared residuals in each region, and of weights."""
+    weights = level.weights * pair.mask
+    squares = weights * (pair.drawn - pair.target) ** 2
+    regions = np.where(pair.mask > 0, level.model.region_of[pair.ids], -1)
+    inside, count = regions >= 0, len(level.model.layout.regions)
     return (
         np.bincount(regions[inside], squares[inside], count),
         np.bincount(regions[inside], weights[inside], count),

@@ -1,10 +1,10 @@
-"""Normal equations of the residual, summed up pixel by pixel: J itself is never stored.
+"""Normal equations of the photometric residual, accumulated pixel by pixel; J is never stored.
 
-The residual is eps(p) = 1/2 sum w rho(I_t - I^) of [Pighin 2002] sec. 6.1.2, with a weight for each
-pixel and a robust rho where [Pighin 2002] has the square; J = G + B of eq. (7), G by Sobel's
+The cost is eps(p) = 1/2 sum w rho(I_t - I^) of [Pighin 2002] sec. 6.1.2, with a weight for each
+pixel and a robust rho where [Pighin 2002] has the square. J = G + B of eq. (7): G by Sobel's
 gradient of the pictures and the chain rule through projection, rotation and shape (app. B), B by
-those of single expressions. What eq. (7) leaves to the reader: at a pixel that stays, a picture
-that moves to the right brings what was to its left, so G takes the gradient with a minus.
+the pictures of single expressions. G has the gradient with a minus, which eq. (7) does not show:
+a picture that moves to the right brings to a pixel what was to its left.
 """
 
 from __future__ import annotations
@@ -16,25 +16,25 @@ import numpy as np
 from mien.arrays import Array, Float, Int
 from mien.numeric.kernels.jit import njit
 from mien.numeric.kernels.threads import for_row_bands
-from mien.track.photometric.image_jacobian import POSE_UNKNOWNS, Flows, pose_flow
-from mien.track.photometric.samples import Answers, Moved, Samples, look_up
+from mien.track.photometric.image_jacobian import POSE_UNKNOWNS, ImageJacobian, pose_jacobian
+from mien.track.photometric.samples import ParameterSupport, Samples, Warp, sample_bicubic
 
 _CHUNK = 256
-"""Samples that are worked on together: their columns stay in the nearest cache."""
-Part = tuple[int, int]
-"""Their first, and how many they are."""
+"""Samples that are processed together, so that their columns stay in the first-level cache."""
+_Chunk = tuple[int, int]
+"""First sample of a chunk, and how many there are."""
 _BLOCK = 2000
-"""Samples, about, that are summed up apart: the same sums, whatever the number of threads."""
+"""About how many samples have sums of their own: results do not depend on the number of threads."""
 
 
-def pose_answers(triangles: Int[Array, "f 3"]) -> Answers:
-    """Of the pose alone, which concerns every pixel and mixes nothing.
+def pose_support(triangles: Int[Array, "f 3"]) -> ParameterSupport:
+    """Support of the pose alone, which affects every pixel and no blending weight.
 
     Args:
-        triangles: of Answers.
+        triangles: of ParameterSupport.
     """
     none = np.full(POSE_UNKNOWNS, -1, np.int32)
-    return Answers(
+    return ParameterSupport(
         sets=np.arange(POSE_UNKNOWNS, dtype=np.int32)[None],
         sizes=np.array([POSE_UNKNOWNS], np.int32),
         set_of=np.zeros(len(triangles), np.int32),
@@ -47,12 +47,12 @@ def pose_answers(triangles: Int[Array, "f 3"]) -> Answers:
 
 
 @dataclass(frozen=True)
-class Equations:
-    """J^T W J, J^T W r, and what the residual is.
+class NormalEquations:
+    """J^T W J, J^T W r, and the residual.
 
     Attributes:
         matrix: (N, N).
-        vector: (N,), so that matrix @ step = vector lowers the residual.
+        vector: (N,); the Gauss-Newton step solves matrix @ step = vector.
         squares: sum of w rho(r) over the pixels.
         weight: sum of w.
     """
@@ -63,41 +63,43 @@ class Equations:
     weight: float
 
 
-def sum_up(
+def accumulate_normal_equations(
     samples: Samples,
-    moved: Moved,
-    flows: Flows,
-    answers: Answers,
+    warp: Warp,
+    jacobian: ImageJacobian,
+    support: ParameterSupport,
     *,
     matrix: bool = True,
-) -> Equations:
-    """Equations of the unknowns where a guess puts the samples.
+) -> NormalEquations:
+    """Normal equations of all unknowns at warped samples.
 
     Args:
-        flows: where the unknowns move them.
-        answers: which unknowns concern which samples.
-        matrix: where the samples were drawn, for the first step; False: leave J^T W J at 0, it is
-            next to the same near by.
+        samples: of the drawn face.
+        warp: where they are compared with the frame.
+        jacobian: of image points by the unknowns.
+        support: which unknowns affect which samples.
+        matrix: True for the first step, where the samples were drawn. False leaves J^T W J at 0:
+            near by it is nearly the same.
 
     Source:
-        that a Hessian may be kept, Baker and Matthews, Lucas-Kanade 20 years on, 2004.
+        the constant Hessian: Baker and Matthews, Lucas-Kanade 20 years on, 2004.
     """
-    sets, most = answers.sets.shape
+    sets, most = support.sets.shape
     side = most if matrix else 0
     parts = -(-len(samples.drawn) // _BLOCK)
     matrices, vectors = np.zeros((parts, sets, side, side)), np.zeros((parts, sets, most))
     totals = np.zeros((parts, 2))
-    inputs = (samples, moved, flows, answers)
+    inputs = (samples, warp, jacobian, support)
 
     def blocks(first: int, end: int) -> None:
         _add_blocks(*inputs, first, end, matrices, vectors, totals)
 
     for_row_bands(blocks, parts, work=5 * len(samples.drawn))
-    count = len(answers.region)
+    count = len(support.region)
     half, vector = np.zeros((count, count)), np.zeros(count)
-    _scatter(matrices, vectors, answers.sets, answers.sizes, half, vector)
+    _scatter(matrices, vectors, support.sets, support.sizes, half, vector)
     squares, weight = totals.sum(axis=0).tolist()
-    return Equations(half + np.tril(half, -1).T, vector, squares, weight)
+    return NormalEquations(half + np.tril(half, -1).T, vector, squares, weight)
 
 
 @njit(cache=True, nogil=True)
@@ -116,67 +118,69 @@ def _scatter(
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _add_blocks(
     samples: Samples,
-    moved: Moved,
-    flows: Flows,
-    answers: Answers,
+    warp: Warp,
+    jacobian: ImageJacobian,
+    support: ParameterSupport,
     first: int,
     end: int,
     matrices: Array,
     vectors: Array,
     totals: Array,
 ) -> None:
-    most, starts = answers.sets.shape[1], samples.starts
+    most, starts = support.sets.shape[1], samples.starts
     columns = np.empty((most, _CHUNK), np.float32)
-    place = (np.empty(_CHUNK, np.float32), np.empty(_CHUNK, np.float32))
+    pixels = (np.empty(_CHUNK, np.float32), np.empty(_CHUNK, np.float32))
     r, weights = np.empty(_CHUNK, np.float32), np.empty(_CHUNK, np.float32)
-    slopes = samples.first if matrices.shape[2] else samples.slopes
+    slopes = samples.mean_slopes if matrices.shape[2] else samples.slopes
     for block in range(first, end):
-        for s in range(len(answers.sets)):
-            own = answers.sets[s, : answers.sizes[s]]
+        for s in range(len(support.sets)):
+            own = support.sets[s, : support.sizes[s]]
             count = starts[s + 1] - starts[s]
             span = [starts[s] + count * edge // len(totals) for edge in (block, block + 1)]
             for a in range(span[0], span[1], _CHUNK):
-                part = (a, min(_CHUNK, span[1] - a))
-                _move_with_pose(samples, slopes, flows, part, columns)
-                _move_rigidly(samples, moved, part, *place)
-                _move_with_face(samples, slopes, flows, own, moved.step, part, columns, *place)
-                _mix(samples, answers, own, moved.step, part, columns, r)
-                _compare(samples.target, part, *place, r)
-                _weigh(samples, part, r, weights, totals[block])
-                _add(columns, own, r, weights, part, matrices[block, s], vectors[block, s])
+                chunk = (a, min(_CHUNK, span[1] - a))
+                _pose_columns(samples, slopes, jacobian, chunk, columns)
+                _warp_rigidly(samples, warp, chunk, *pixels)
+                _face_columns(samples, slopes, jacobian, own, warp.step, chunk, columns, *pixels)
+                _mixture_columns(samples, support, own, warp.step, chunk, columns, r)
+                _residuals(samples.target, chunk, *pixels, r)
+                _robust_weights(samples, chunk, r, weights, totals[block])
+                _add_products(
+                    columns, own, r, weights, chunk, matrices[block, s], vectors[block, s]
+                )
 
 
 @njit(nogil=True, fastmath=True, error_model="numpy")
-def _move_with_pose(
-    samples: Samples, slopes: Array, flows: Flows, part: Part, columns: Array
+def _pose_columns(
+    samples: Samples, slopes: Array, jacobian: ImageJacobian, chunk: _Chunk, columns: Array
 ) -> None:
-    """Fill in how samples change where the pose's unknowns move them."""
-    first, count = part
+    """Fill in the columns of J of the pose's unknowns."""
+    first, count = chunk
     x, y, z = samples.x[first:], samples.y[first:], samples.z[first:]
     gx, gy = slopes[0][first:], slopes[1][first:]
-    t = (np.float32(flows.t[0]), np.float32(flows.t[1]), np.float32(flows.t[2]))
-    focal = np.float32(flows.lens[0])
+    t = (np.float32(jacobian.t[0]), np.float32(jacobian.t[1]), np.float32(jacobian.t[2]))
+    focal = np.float32(jacobian.intrinsics.focal)
     for n in range(count):
-        flow = pose_flow(x[n], y[n], z[n], t, focal)
-        columns[0, n] = gx[n] * flow[0][0] + gy[n] * flow[0][1]
-        columns[1, n] = gx[n] * flow[1][0] + gy[n] * flow[1][1]
-        columns[2, n] = gx[n] * flow[2][0] + gy[n] * flow[2][1]
-        columns[3, n] = gx[n] * flow[3][0] + gy[n] * flow[3][1]
-        columns[4, n] = gx[n] * flow[4][0] + gy[n] * flow[4][1]
-        columns[5, n] = gx[n] * flow[5][0] + gy[n] * flow[5][1]
-        columns[6, n] = gx[n] * flow[6][0] + gy[n] * flow[6][1]
+        by_pose = pose_jacobian(x[n], y[n], z[n], t, focal)
+        columns[0, n] = gx[n] * by_pose[0][0] + gy[n] * by_pose[0][1]
+        columns[1, n] = gx[n] * by_pose[1][0] + gy[n] * by_pose[1][1]
+        columns[2, n] = gx[n] * by_pose[2][0] + gy[n] * by_pose[2][1]
+        columns[3, n] = gx[n] * by_pose[3][0] + gy[n] * by_pose[3][1]
+        columns[4, n] = gx[n] * by_pose[4][0] + gy[n] * by_pose[4][1]
+        columns[5, n] = gx[n] * by_pose[5][0] + gy[n] * by_pose[5][1]
+        columns[6, n] = gx[n] * by_pose[6][0] + gy[n] * by_pose[6][1]
     for p in range(POSE_UNKNOWNS):
-        columns[p] *= flows.counted[p]
+        columns[p] *= jacobian.active[p]
 
 
 @njit(nogil=True, fastmath=True, error_model="numpy")
-def _move_rigidly(samples: Samples, moved: Moved, part: Part, cols: Array, rows: Array) -> None:
-    """Fill in where samples are now, were the face rigid: the first pixel's centre is at 0, 0."""
-    first, count = part
+def _warp_rigidly(samples: Samples, warp: Warp, chunk: _Chunk, cols: Array, rows: Array) -> None:
+    """Fill in where the rigid motion moves the samples, px; 0, 0 is the first pixel's centre."""
+    first, count = chunk
     x, y, z = samples.x[first:], samples.y[first:], samples.z[first:]
-    R, t = moved.turn.astype(np.float32), moved.shift.astype(np.float32)
-    focal = np.float32(moved.lens[0])
-    cx, cy = np.float32(moved.lens[1] - 0.5), np.float32(moved.lens[2] - 0.5)
+    R, t = warp.R.astype(np.float32), warp.t.astype(np.float32)
+    focal = np.float32(warp.intrinsics.focal)
+    cx, cy = np.float32(warp.intrinsics.cx - 0.5), np.float32(warp.intrinsics.cy - 0.5)
     for n in range(count):
         X, Y, Z = x[n] * z[n], y[n] * z[n], z[n]
         scale = focal / (R[2, 0] * X + R[2, 1] * Y + R[2, 2] * Z + t[2])
@@ -185,22 +189,22 @@ def _move_rigidly(samples: Samples, moved: Moved, part: Part, cols: Array, rows:
 
 
 @njit(nogil=True, fastmath=True, error_model="numpy")
-def _move_with_face(
+def _face_columns(
     samples: Samples,
     slopes: Array,
-    flows: Flows,
+    jacobian: ImageJacobian,
     own: Array,
     step: Array,
-    part: Part,
+    chunk: _Chunk,
     columns: Array,
     cols: Array,
     rows: Array,
 ) -> None:
-    """Fill in the columns of the face's unknowns; add by how much their step moves the samples."""
-    first, count = part
+    """Fill in the columns of the face's unknowns; add the samples' motion by their step."""
+    first, count = chunk
     gx, gy = slopes[0][first:], slopes[1][first:]
     corners, barycentrics = samples.corners[first:], samples.barycentrics[first:]
-    face, counted, by = flows.face, flows.counted, step.astype(np.float32)
+    face, active, by = jacobian.face, jacobian.active, step.astype(np.float32)
     for n in range(count):
         i, j, k = corners[n, 0], corners[n, 1], corners[n, 2]
         b0, b1, b2 = barycentrics[n, 0], barycentrics[n, 1], barycentrics[n, 2]
@@ -208,65 +212,73 @@ def _move_with_face(
             p = np.uint32(own[a] - POSE_UNKNOWNS)
             u = b0 * face[i, p, 0] + b1 * face[j, p, 0] + b2 * face[k, p, 0]
             v = b0 * face[i, p, 1] + b1 * face[j, p, 1] + b2 * face[k, p, 1]
-            columns[a, n] = counted[own[a]] * (gx[n] * u + gy[n] * v)
+            columns[a, n] = active[own[a]] * (gx[n] * u + gy[n] * v)
             cols[n] += by[own[a]] * u
             rows[n] += by[own[a]] * v
 
 
 @njit(nogil=True, fastmath=True, error_model="numpy")
-def _mix(
+def _mixture_columns(
     samples: Samples,
-    answers: Answers,
+    support: ParameterSupport,
     own: Array,
     step: Array,
-    part: Part,
+    chunk: _Chunk,
     columns: Array,
     drawn: Array,
 ) -> None:
-    """Add how samples change where unknowns change the mixture; fill in what their step drew."""
-    first, count = part
+    """Add the change of the mixture to the columns; fill in the luma after the step."""
+    first, count = chunk
     drawn[:count] = samples.drawn[first : first + count]
     for a in range(len(own)):
-        if answers.region[own[a]] >= 0:
-            shares = samples.shares[answers.region[own[a]]][first:]
-            along = samples.along[answers.direction[own[a]]][first:]
+        if support.region[own[a]] >= 0:
+            region_weights = samples.region_weights[support.region[own[a]]][first:]
+            mixture_slopes = samples.mixture_slopes[support.direction[own[a]]][first:]
             by = np.float32(step[own[a]])
             for n in range(count):
-                change = shares[n] * along[n]
+                change = region_weights[n] * mixture_slopes[n]
                 columns[a, n] += change
                 drawn[n] += by * change
 
 
 @njit(nogil=True, fastmath=True, error_model="numpy")
-def _compare(target: Array, part: Part, cols: Array, rows: Array, r: Array) -> None:
-    """The target at these places, less what was in r."""
+def _residuals(target: Array, chunk: _Chunk, cols: Array, rows: Array, r: Array) -> None:
+    """Replace the luma in r by the target at these pixels less it."""
     height, width = target.shape
     flat = target.reshape(height * width)
-    for n in range(part[1]):
-        r[n] = look_up(flat, width, height, cols[n], rows[n]) - r[n]
+    for n in range(chunk[1]):
+        r[n] = sample_bicubic(flat, width, height, cols[n], rows[n]) - r[n]
 
 
 @njit(nogil=True, fastmath=True, error_model="numpy")
-def _weigh(samples: Samples, part: Part, r: Array, weights: Array, totals: Array) -> None:
-    """Fill in robust weights; add up w rho(r) and w."""
-    first, count = part
+def _robust_weights(
+    samples: Samples, chunk: _Chunk, r: Array, weights: Array, totals: Array
+) -> None:
+    """Fill in Geman and McClure's weights; add up w rho(r) and w."""
+    first, count = chunk
     given, one = samples.weights[first:], np.float32(1)
     inverse = np.float32(1 / samples.scale**2)
     squares = total = np.float32(0)
     for n in range(count):
-        trust = one / (one + r[n] * r[n] * inverse)
-        weights[n] = given[n] * trust * trust
-        squares += given[n] * trust * r[n] * r[n]
+        robust = one / (one + r[n] * r[n] * inverse)
+        weights[n] = given[n] * robust * robust
+        squares += given[n] * robust * r[n] * r[n]
         total += given[n]
     totals[0] += squares
     totals[1] += total
 
 
 @njit(nogil=True, fastmath=True, error_model="numpy")
-def _add(
-    columns: Array, own: Array, r: Array, weights: Array, part: Part, matrix: Array, vector: Array
+def _add_products(
+    columns: Array,
+    own: Array,
+    r: Array,
+    weights: Array,
+    chunk: _Chunk,
+    matrix: Array,
+    vector: Array,
 ) -> None:
-    count = part[1]
+    count = chunk[1]
     for a in range(len(own)):
         one = columns[a]
         total = np.float32(0)

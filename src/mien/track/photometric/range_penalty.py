@@ -1,4 +1,4 @@
-"""What keeps weights in range: D(p) of [Pighin 2002] sec. 6.1.2, with its gradient and Hessian."""
+"""The penalty of weights out of range: D(p) of [Pighin 2002] sec. 6.1.2, with derivatives."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from mien.arrays import Array, Float, frozen
 from mien.rig.basis import Basis
 
-_FARTHEST_GAZE = np.array([0.55, 0.4])
-"""Radians to the sides, and up or down: eyes turn no farther, and lids hide what would tell."""
+_MAX_GAZE = np.array([0.55, 0.4])
+"""Radians to the sides, and up or down: eyes turn no farther, or lids hide them."""
 
 
-class Limits(NamedTuple):
-    """What of a face is to lie from 0 to 1: directions @ parameters + offset.
+class RangeLimits(NamedTuple):
+    """Quantities of a face that should lie from 0 to 1: directions @ parameters + offset.
 
     Attributes:
         directions: (M, P).
@@ -25,18 +25,18 @@ class Limits(NamedTuple):
     offset: Float[Array, " m"]
 
     @classmethod
-    def of(cls, basis: Basis, regions: int, units: int) -> Limits:
-        """Blending weights of all regions, units, and gaze from end to end of its range."""
+    def of(cls, basis: Basis, regions: int, units: int) -> RangeLimits:
+        """Blending weights of all regions, units, and gaze as a fraction of its range."""
         from scipy.linalg import block_diag
 
-        gaze = np.diag(0.5 / _FARTHEST_GAZE)
+        gaze = np.diag(0.5 / _MAX_GAZE)
         directions = block_diag(*[basis.Q] * regions, np.eye(units), gaze)
         offset = np.concatenate([*[basis.w_star] * regions, np.zeros(units), [0.5, 0.5]])
         return cls(frozen(directions), frozen(offset))
 
 
 class Penalty(NamedTuple):
-    """D by parameters of which weights are linear functions, w = directions a + w*.
+    """D(p), with derivatives by the parameters.
 
     Attributes:
         value: >= 0.
@@ -52,11 +52,17 @@ class Penalty(NamedTuple):
 def range_penalty(
     weights: Float[Array, " k"], c: float, directions: Float[Array, "k n"]
 ) -> Penalty | None:
-    """c times the sum of min(0, w)^2 + max(0, w - 1)^2; None where all are in range: no penalty."""
+    """c times the sum of min(0, w)^2 + max(0, w - 1)^2; None where all are in range.
+
+    Args:
+        weights: linear functions of the parameters.
+        c: weight of the penalty.
+        directions: derivatives of the weights by the parameters.
+    """
     beyond = np.minimum(weights, 0) + np.maximum(weights - 1, 0)
     outside = beyond != 0
     if not outside.any():
         return None
-    pressed = directions[outside]
-    gradient = 2 * c * beyond[outside] @ pressed
-    return Penalty(float(c * beyond @ beyond), gradient, 2 * c * pressed.T @ pressed)
+    active = directions[outside]
+    gradient = 2 * c * beyond[outside] @ active
+    return Penalty(float(c * beyond @ beyond), gradient, 2 * c * active.T @ active)
