@@ -214,7 +214,7 @@ class Counting:
     """Finds another head in every frame, the same ones in every run."""
 
     layout = LAYOUT
-    met_others = False
+    other_faces_seen = False
     stops_at: int | None = None
 
     def step(self, pixels: Array, frame: int, time: float) -> TrackedFrame:

@@ -30,7 +30,7 @@ class Spy:
     """Finds a random head in any picture, another with every step."""
 
     layout = LAYOUT
-    met_others = False
+    other_faces_seen = False
 
     def __init__(self) -> None:
         self.asked: list[tuple[int, int, float]] = []

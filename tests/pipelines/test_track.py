@@ -36,7 +36,7 @@ class BrightnessTracker:
     layout = LAYOUT
     stops_at: int | None = None
     made = 0
-    met_others = False
+    other_faces_seen = False
 
     def __init__(self, *arguments: object, **options: object) -> None:
         type(self).made += 1

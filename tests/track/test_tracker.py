@@ -203,7 +203,7 @@ def test_of_several_faces_the_heads_own_is_found(
     found = by.step(frame(0), 0, 0.0)
     assert found.status == "ok"
     assert_truth(found, 0, degrees=0.3, share=0.005, weights=0.08)
-    assert not by.met_others
+    assert not by.other_faces_seen
 
 
 def disturbed(number: int) -> Array:
@@ -223,9 +223,9 @@ def test_after_the_head_no_other_face_is_taken_for_it(told: Told) -> None:
     assert [item.status for item in followed([frame(k) for k in range(5)], by)] == ["ok"] * 5
     told.number = None
     assert by.step(NOBODY, 5, 5 / FPS).status == "lost"
-    assert not by.met_others
+    assert not by.other_faces_seen
     told.number = 6
     assert by.step(other, 6, 6 / FPS).status == "lost"
-    assert by.met_others
+    assert by.other_faces_seen
     told.number = 7
     assert by.step(frame(7), 7, 7 / FPS).status == "reacquired"

@@ -74,12 +74,12 @@ def track_live_video(
             max_side=TRACKING_SIDE,
             on_status=on_status,
         )
-    track, met_others = recorder.track(), recorder.met_others
-    notes = [*summary.notes, *track_notes(track, head, met_others=met_others)]
+    track, other_faces_seen = recorder.track(), recorder.other_faces_seen
+    notes = [*summary.notes, *track_notes(track, head, other_faces_seen=other_faces_seen)]
     if files is not None:
         notes += files.write(track, Video(Path(source)), head, lambda *step: None)
     table = None if files is None else files.table
-    check_not_all_lost(track, _source_name(source), table, met_others=met_others)
+    check_not_all_lost(track, _source_name(source), table, other_faces_seen=other_faces_seen)
     return replace(summary, notes=tuple(notes))
 
 
@@ -128,9 +128,9 @@ class _LiveRecorder:
         return tracked
 
     @property
-    def met_others(self) -> bool:
+    def other_faces_seen(self) -> bool:
         """Whether in a lost frame there was a face."""
-        return self._tracker.met_others
+        return self._tracker.other_faces_seen
 
     def track(self) -> Track:
         """The track of all frames."""

@@ -133,11 +133,11 @@ def track_video(
             seconds = time.perf_counter() - start
             track = run.track(tracker.layout, frames)
             smoothed = track if smooth_seconds is None else smooth(track, smooth_seconds)
-            met_others = tracker.met_others
-            notes += [*clip.notes, *track_notes(track, head, met_others=met_others)]
+            other_faces_seen = tracker.other_faces_seen
+            notes += [*clip.notes, *track_notes(track, head, other_faces_seen=other_faces_seen)]
             notes += files.write(smoothed, clip, head, report)
             journal.remove()
-    check_not_all_lost(track, clip.path, files.table, met_others=met_others)
+    check_not_all_lost(track, clip.path, files.table, other_faces_seen=other_faces_seen)
     return _summary(track, len(kept), seconds, notes)
 
 

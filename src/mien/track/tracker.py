@@ -62,7 +62,7 @@ class Tracker:
 
     Attributes:
         layout: of the numbers that each frame gives.
-        met_others: whether a lost frame had a face in it.
+        other_faces_seen: whether a lost frame had a face in it.
 
     Args:
         head: that is tracked.
@@ -98,7 +98,7 @@ class Tracker:
             head, self.layout, detector, rig=self._model.rig
         )
         self._camera = Camera(width, height, focal_px, np.eye(3), np.array([0.0, 0.0, 1000.0]))
-        self.met_others = False
+        self.other_faces_seen = False
         self._past: list[TrackedFrame] = []
         self._errors: list[float] = []
         self._steady = options.steady
@@ -108,7 +108,7 @@ class Tracker:
         """Go on as if these frames had been tracked."""
         self._past = list(frames[-2:])
         self._errors = [item.rms for item in frames if item.state is not None]
-        self.met_others = False
+        self.other_faces_seen = False
 
     def step(
         self,
@@ -194,7 +194,7 @@ class Tracker:
         if best is None and small_too:
             small = self._head_detector.detect(pixels, focal_px=camera.focal_px, small=True)
             best, starts = self._best_match(small, pixels, camera), [*starts, *small]
-        self.met_others |= bool(starts) and best is None
+        self.other_faces_seen |= bool(starts) and best is None
         return best
 
     def resembles(self, pixels: UInt8[Array, "h w 3"], found: HeadDetection) -> bool:

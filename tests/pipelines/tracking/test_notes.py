@@ -41,8 +41,8 @@ def track_of(*frames: TrackedFrame) -> Track:
     return Track(LAYOUT, WIDTH, HEIGHT, FOCAL, 10.0, frames)
 
 
-def said(*frames: TrackedFrame, met_others: bool = False) -> list[str]:
-    return track_notes(track_of(*frames), HEAD, met_others=met_others)
+def said(*frames: TrackedFrame, other_faces_seen: bool = False) -> list[str]:
+    return track_notes(track_of(*frames), HEAD, other_faces_seen=other_faces_seen)
 
 
 def test_ordinary_track_has_no_notes() -> None:
@@ -58,7 +58,7 @@ def test_lost_and_cut_frames_are_counted() -> None:
 
 
 def test_note_on_other_faces() -> None:
-    (note,) = said(shown(0), lost(1), met_others=True)
+    (note,) = said(shown(0), lost(1), other_faces_seen=True)
     assert note == (
         "the face is lost in 1 of 2 frames, at 0.10 s first; faces were there, none like the "
         "head's: another person's, covered, or in other light"
@@ -74,14 +74,18 @@ def test_note_on_a_median_error_that_is_too_large() -> None:
 
 
 @pytest.mark.parametrize(
-    ("met_others", "table", "message"),
+    ("other_faces_seen", "table", "message"),
     [
         (False, None, r"^a\.mp4: expected .*, found in none of 2 frames: no face was there$"),
         (True, Path("t.csv"), r"frames: faces were there, none like .*; t\.csv says so of each$"),
     ],
 )
-def test_all_lost(met_others: bool, table: Path | None, message: str) -> None:
+def test_all_lost(other_faces_seen: bool, table: Path | None, message: str) -> None:
     with pytest.raises(EstimationError, match=message):
-        check_not_all_lost(track_of(lost(0), lost(1)), "a.mp4", table, met_others=met_others)
-    check_not_all_lost(track_of(lost(0), shown(1)), "a.mp4", table, met_others=met_others)
-    check_not_all_lost(track_of(), "a.mp4", table, met_others=met_others)
+        check_not_all_lost(
+            track_of(lost(0), lost(1)), "a.mp4", table, other_faces_seen=other_faces_seen
+        )
+    check_not_all_lost(
+        track_of(lost(0), shown(1)), "a.mp4", table, other_faces_seen=other_faces_seen
+    )
+    check_not_all_lost(track_of(), "a.mp4", table, other_faces_seen=other_faces_seen)

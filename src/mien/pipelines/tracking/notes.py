@@ -22,18 +22,18 @@ _OTHER_FACES = (
 )
 
 
-def track_notes(track: Track, head: Head, *, met_others: bool) -> list[str]:
+def track_notes(track: Track, head: Head, *, other_faces_seen: bool) -> list[str]:
     """How many frames are lost or cut, and whether the face looks like the head's.
 
     Args:
         track: of the head.
         head: that was tracked.
-        met_others: whether in a lost frame there was a face.
+        other_faces_seen: whether in a lost frame there was a face.
     """
     notes = []
     lost = [frame for frame in track.frames if frame.state is None]
     if lost:
-        why = f"; {_OTHER_FACES}" if met_others else ""
+        why = f"; {_OTHER_FACES}" if other_faces_seen else ""
         notes.append(f"the face is lost in {_counted(lost, track)}{why}")
     landmarks = load_generic_head().landmark_positions(head.mesh.vertices)
     cut = [frame for frame in track.frames if _is_cut(frame, track, landmarks)]
@@ -46,7 +46,7 @@ def track_notes(track: Track, head: Head, *, met_others: bool) -> list[str]:
 
 
 def check_not_all_lost(
-    track: Track, video: str | Path, table: Path | None, *, met_others: bool
+    track: Track, video: str | Path, table: Path | None, *, other_faces_seen: bool
 ) -> None:
     """Refuse a track whose frames are all lost.
 
@@ -54,14 +54,14 @@ def check_not_all_lost(
         track: of the video.
         video: that the message names.
         table: where the track is written, if it is.
-        met_others: whether in a lost frame there was a face.
+        other_faces_seen: whether in a lost frame there was a face.
 
     Raises:
         EstimationError: the head is in no frame.
     """
     if not track.frames or any(frame.state for frame in track.frames):
         return
-    reason = _OTHER_FACES if met_others else "no face was there"
+    reason = _OTHER_FACES if other_faces_seen else "no face was there"
     written = "" if table is None else f"; {table} says so of each"
     raise EstimationError(
         f"{video}: expected the head's face, found in none of {len(track.frames)} frames: "

@@ -32,7 +32,7 @@ class VideoTracker(Protocol):
     """A tracker that can resume; `mien.track.tracker.Tracker` is one."""
 
     layout: Layout
-    met_others: bool
+    other_faces_seen: bool
 
     def step(self, pixels: UInt8[Array, "h w 3"], frame: int, time: float) -> TrackedFrame:
         """The next picture tracked: sRGB, its number, and its time in seconds."""
