@@ -271,15 +271,16 @@ def build_head_folder(
         progress: as for build_head.
 
     Raises:
-        as build_head; InputError: the place holds something that is no head folder, or cannot be
+        InputError: as build_head; the place holds something that is no head folder, or cannot be
             written. Whatever was there stays until the new folder is whole.
+        EstimationError: as build_head.
     """
-    tell = progress or no_progress
+    report_progress = progress or no_progress
     check_head_place(folder, read=[source])
     result = build_head(source, options=options, progress=progress)
     stage = "Writing the head"
     with head_place(folder, read=[source]) as place:
-        tell(stage, 0, 2)
+        report_progress(stage, 0, 2)
         photos = _photos(result.capture)
         used = [(view.photo, photos[view.photo]) for view in result.head.views]
         write_head(result.head, place, photos=used)
@@ -287,12 +288,12 @@ def build_head_folder(
             if view.annotations:
                 file = (place / "annotations" / view.photo.name).with_suffix(".json")
                 save_annotations(file, view.photo, view.annotations)
-        tell(stage, 1, 2)
+        report_progress(stage, 1, 2)
         save_video(place / TURNTABLE, turntable_frames(result.head), fps=24)
-        tell(stage, 2, 2)
+        report_progress(stage, 2, 2)
         report = ReportInput(
             result.head, photos, result.fits, result.coverage, result.notes, TURNTABLE
         )
-        page = render_report(report, progress=stage_progress(tell, REPORTING))
+        page = render_report(report, progress=stage_progress(report_progress, REPORTING))
         (place / "report.html").write_text(page, encoding="utf-8")
     return replace(result, kept=kept_notes(Path(folder)))

@@ -6,6 +6,7 @@ from mien.io.tracks.track_csv import save_track as save_track
 from mien.pipelines.track import Tracked as Tracked
 from mien.pipelines.track import track_video as track_video
 from mien.pipelines.tracking.outputs import TrackFiles as TrackFiles
+from mien.track.photometric.frame_fit import FrameFitOptions as FrameFitOptions
 from mien.track.series import Series as Series
 from mien.track.series import series_of as series_of
 from mien.track.smoothing import smooth as smooth

@@ -27,6 +27,7 @@ def smooth(track: Track, seconds: float) -> Track:
     stays as it was measured.
 
     Args:
+        track: lost frames may be among its frames.
         seconds: standard deviation of the window; noise of independent frames falls to about 0.53 /
             sqrt(seconds * fps) of it.
 

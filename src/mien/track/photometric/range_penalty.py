@@ -52,7 +52,7 @@ class Penalty(NamedTuple):
 def range_penalty(
     weights: Float[Array, " k"], c: float, directions: Float[Array, "k n"]
 ) -> Penalty | None:
-    """c times the sum of min(0, w)^2 + max(0, w - 1)^2; None where all are in range.
+    """The sum, times c, of min(0, w)^2 + max(0, w - 1)^2; None where all are in range.
 
     Args:
         weights: linear functions of the parameters.
