@@ -192,10 +192,6 @@ def test_no_folder_shows_more_modules_than_a_reader_takes_in() -> None:
         assert len(modules) <= MAX_MODULES, f"{name}: {len(modules)} modules"
 
 
-SHARED_CLASS_NAMES = frozenset({"FitOptions"})
-"""Names of more than one public class, until they are renamed."""
-
-
 def test_no_two_public_classes_share_a_name() -> None:
     modules: dict[str, list[str]] = {}
     for module, source in all_sources().items():
@@ -203,4 +199,4 @@ def test_no_two_public_classes_share_a_name() -> None:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 modules.setdefault(node.name, []).append(module)
     shared = {name: found for name, found in modules.items() if len(found) > 1}
-    assert shared.keys() <= SHARED_CLASS_NAMES, shared
+    assert not shared
