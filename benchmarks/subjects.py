@@ -200,7 +200,7 @@ def _deformed(
     mesh = generic.mesh
     moves = smooth_field(rng, vertices, rms_mm=rms_mm, length_mm=length_mm)
     for name in ("left_eyeball", "right_eyeball"):
-        ball = np.unique(mesh.triangles[mesh.triangles_of(name)])
+        ball = mesh.vertices_of(name)
         moves[ball] = moves[ball].mean(axis=0)
     chosen = np.unique(mesh.triangles[mesh.triangles_of(*(parts or mesh.part_names))])
     moved = vertices.copy()

@@ -20,7 +20,7 @@ from mien.reconstruction.observations import SurfaceObservations
 from people import person
 
 NEUTRAL = person(3)
-SKIN = np.unique(GENERIC.mesh.triangles[GENERIC.mesh.triangles_of("skin")])
+SKIN = GENERIC.mesh.vertices_of("skin")
 FACE = SKIN[(GENERIC.regions["face"][SKIN] > 0.5) & (GENERIC.regions["eye_socket"][SKIN] < 0.5)]
 STEADY = np.array([not name.startswith(("eyeLook", "tongueOut")) for name in GENERIC.unit_names])
 
@@ -44,7 +44,7 @@ def looking(vertices: Array, yaw: float, pitch: float) -> Array:
     about_x, about_y = rotation_from_vector(np.radians([[-pitch, 0, 0], [0, yaw, 0]]))
     result = vertices.copy()
     for name in ("left_eyeball", "right_eyeball"):
-        ball = np.unique(GENERIC.mesh.triangles[GENERIC.mesh.triangles_of(name)])
+        ball = GENERIC.mesh.vertices_of(name)
         centre = vertices[ball].mean(axis=0)
         result[ball] = centre + (vertices[ball] - centre) @ (about_y @ about_x).T
     return result

@@ -11,7 +11,6 @@ from expressive import bump, weights_of
 from marbled import GENERIC
 from mien.arrays import Array
 from mien.head import ATLAS, Expression, Head
-from mien.rig.followers import part_vertices
 from mien.rig.gaze import with_turned_eyes
 
 REST = np.asarray(GENERIC.mesh.vertices, np.float64)
@@ -28,7 +27,7 @@ _BUMPS = {
     "awe": bump(REST[GENERIC.vertex_of("chin")], width_mm=20, along=(0, -3, 0)),
 }
 
-EYES = part_vertices(GENERIC, "left_eyeball", "right_eyeball")
+EYES = GENERIC.mesh.vertices_of("left_eyeball", "right_eyeball")
 _SKIN = np.ones((len(REST), 1))
 _SKIN[EYES] = 0
 

@@ -53,7 +53,7 @@ def _picture(
 
 def _paint(head: GenericHead) -> Paint:
     paint = paint_head(head.mesh, head.regions["lips"], np.zeros(len(head.mesh.vertices)))
-    tongue = np.unique(head.mesh.triangles[head.mesh.triangles_of("tongue")])
+    tongue = head.mesh.vertices_of("tongue")
     paint.colours[tongue] = (0.7, 0.35, 0.35)
     return paint
 

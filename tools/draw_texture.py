@@ -86,7 +86,7 @@ def _atlas(fitted: _Fitted, mirror: Int[Array, " v"] | None) -> Texture:
 
 
 def _views(mesh: Mesh, texture: Texture) -> UInt8[Array, "h w 3"]:
-    skin = np.unique(mesh.triangles[mesh.triangles_of("skin")])
+    skin = mesh.vertices_of("skin")
     images = []
     for yaw in (0, 45, 90, 180):
         camera = orbit_camera(np.radians(yaw), width=320, height=400, vertices=mesh.vertices[skin])

@@ -65,6 +65,10 @@ class Mesh:
             raise InputError("part", " or ".join(self.part_names), unknown[0])
         return np.flatnonzero(np.isin(self.part, [self.part_names.index(name) for name in parts]))
 
+    def vertices_of(self, *parts: str) -> Int[Array, " n"]:
+        """Indices of the named parts' vertices, ascending. Raises: InputError: no such part."""
+        return np.unique(self.triangles[self.triangles_of(*parts)])
+
     def submesh(self, triangles: Int[Array, " f"]) -> Mesh:
         """The same vertices with only the given triangles (by index)."""
         has_uvs = len(self.uv_triangles) > 0

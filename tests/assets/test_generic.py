@@ -10,7 +10,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import mien.assets.generic as generic
-from mien.arrays import Array
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.errors import FileFormatError, InputError
 from mien.numeric.raster.rasterizer import rasterize
@@ -56,10 +55,6 @@ def head() -> GenericHead:
     return load_generic_head()
 
 
-def part_vertices(head: GenericHead, part: str) -> Array:
-    return np.unique(head.mesh.triangles[head.mesh.triangles_of(part)])
-
-
 def partner(name: str) -> str:
     for side, other in (("left", "right"), ("right", "left"), ("Left", "Right"), ("Right", "Left")):
         if name.startswith(f"{side}_"):
@@ -72,12 +67,12 @@ def partner(name: str) -> str:
 class TestMesh:
     def test_parts_come_in_the_agreed_order_and_share_no_vertex(self, head: GenericHead) -> None:
         assert head.mesh.part_names == PARTS
-        owners = [part_vertices(head, part) for part in PARTS]
+        owners = [head.mesh.vertices_of(part) for part in PARTS]
         assert_array_equal(np.concatenate(owners), np.arange(len(head.mesh.vertices)))
 
     def test_the_eyes_set_origin_and_scale(self, head: GenericHead) -> None:
         left, right = (
-            head.mesh.vertices[part_vertices(head, f"{side}_eyeball")].mean(0)
+            head.mesh.vertices[head.mesh.vertices_of(f"{side}_eyeball")].mean(0)
             for side in ("left", "right")
         )
         assert_allclose(left, [31.5, 0, 0], atol=1e-4)
@@ -156,9 +151,9 @@ class TestUnits:
     def test_jaw_open_lowers_chin_lower_teeth_and_tongue_only(self, head: GenericHead) -> None:
         offsets = head.unit_offsets[head.unit_names.index("jawOpen")]
         assert offsets[head.points["chin"], 1] < -15
-        assert offsets[part_vertices(head, "lower_teeth"), 1].mean() < -10
-        assert offsets[part_vertices(head, "tongue"), 1].mean() < -5
-        assert_array_equal(offsets[part_vertices(head, "upper_teeth")], 0)
+        assert offsets[head.mesh.vertices_of("lower_teeth"), 1].mean() < -10
+        assert offsets[head.mesh.vertices_of("tongue"), 1].mean() < -5
+        assert_array_equal(offsets[head.mesh.vertices_of("upper_teeth")], 0)
 
     def test_the_left_blink_closes_the_subjects_left_eye(self, head: GenericHead) -> None:
         offsets = head.unit_offsets[head.unit_names.index("eyeBlinkLeft")]
@@ -169,17 +164,17 @@ class TestUnits:
 
     def test_looking_left_turns_the_eyeball(self, head: GenericHead) -> None:
         offsets = head.unit_offsets[head.unit_names.index("eyeLookOutLeft")]
-        eye = part_vertices(head, "left_eyeball")
+        eye = head.mesh.vertices_of("left_eyeball")
         front = eye[head.mesh.vertices[eye, 2].argmax()]
         assert offsets[front, 0] > 3
-        assert_array_equal(offsets[part_vertices(head, "right_eyeball")], 0)
+        assert_array_equal(offsets[head.mesh.vertices_of("right_eyeball")], 0)
 
 
 class TestIdentity:
     def test_keeps_the_eyes_centres(self, head: GenericHead, rng: np.random.Generator) -> None:
         offsets = head.identity.offsets(rng.normal(size=len(head.identity.components)))
         for side in ("left", "right"):
-            moved = offsets[part_vertices(head, f"{side}_eyeball")].mean(0)
+            moved = offsets[head.mesh.vertices_of(f"{side}_eyeball")].mean(0)
             assert_allclose(moved, 0, atol=0.05)
 
     def test_components_are_symmetric_or_antisymmetric(self, head: GenericHead) -> None:
@@ -219,7 +214,7 @@ class TestIdentity:
 
 class TestRegions:
     def test_lie_between_0_and_1_and_are_zero_off_the_skin(self, head: GenericHead) -> None:
-        beyond = np.setdiff1d(np.arange(len(head.mesh.vertices)), part_vertices(head, "skin"))
+        beyond = np.setdiff1d(np.arange(len(head.mesh.vertices)), head.mesh.vertices_of("skin"))
         for mask in head.regions.values():
             assert mask.dtype == np.float32
             assert mask.shape == (len(head.mesh.vertices),)
@@ -229,7 +224,7 @@ class TestRegions:
     def test_the_coarse_regions_share_out_the_skin(self, head: GenericHead) -> None:
         names = ("face", "neck", "scalp", "left_ear", "right_ear", "mouth_cavity", "eye_socket")
         total = np.sum([head.regions[name] for name in names], axis=0)
-        assert_allclose(total[part_vertices(head, "skin")], 1, atol=1e-5)
+        assert_allclose(total[head.mesh.vertices_of("skin")], 1, atol=1e-5)
 
     @pytest.mark.parametrize(
         ("whole", "pieces"),
@@ -269,7 +264,7 @@ class TestFeatures:
         assert len(POINTS) == 13
 
     def test_lie_on_the_skin_and_curves_visit_each_vertex_once(self, head: GenericHead) -> None:
-        skin = set(part_vertices(head, "skin").tolist())
+        skin = set(head.mesh.vertices_of("skin").tolist())
         assert set(head.points.values()) <= skin
         for line in head.polylines.values():
             assert set(line) <= skin

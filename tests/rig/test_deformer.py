@@ -8,7 +8,7 @@ import pytest
 from mien.assets.generic import load_generic_head
 from mien.errors import InputError
 from mien.rig.deformer import Contacts, FaceDeformer
-from mien.rig.followers import Followers, part_vertices
+from mien.rig.followers import Followers
 from mien.rig.gaze import EYE_LOOK_UNITS
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def test_lashes_go_with_the_lid(rigged: Rigged) -> None:
     posed = rigged.posed(eyeBlinkLeft=1.0, eyeLookDownLeft=1.0)
     moved = rigged.deformer.contacts.resolve(posed) - posed
     followers = rigged.deformer.contacts.followers
-    lashes = np.isin(followers.vertices, part_vertices(GENERIC, "lashes"))
+    lashes = np.isin(followers.vertices, GENERIC.mesh.vertices_of("lashes"))
     skin = moved[followers.carriers[lashes]]
     assert np.abs(moved[followers.vertices[lashes]]).max() > 0.5
     assert (moved[followers.vertices[lashes]] <= skin.max(axis=1) + 1e-9).all()

@@ -6,7 +6,6 @@ import pytest
 from marbled import GENERIC
 from mien.arrays import Array
 from mien.errors import InputError
-from mien.rig.followers import part_vertices
 from mien.rig.regions import ENCLOSING_REGIONS, MASK_NAMES, check_masks, default_masks
 
 DEFAULT = default_masks(GENERIC)
@@ -18,7 +17,7 @@ COUNT = len(GENERIC.mesh.vertices)
 
 
 def skin_of(region: str) -> Array:
-    skin = part_vertices(GENERIC, "skin")
+    skin = GENERIC.mesh.vertices_of("skin")
     return skin[GENERIC.regions[region][skin] > 0.5]
 
 
@@ -100,12 +99,12 @@ def test_surfaces_behind_lips_and_lids_belong_to_their_regions(region: str, behi
 )
 def test_eyes_teeth_and_tongue_belong_to_one_region(region: str, parts: tuple[str, ...]) -> None:
     for name, mask in WHOLE.items():
-        np.testing.assert_allclose(mask[part_vertices(GENERIC, *parts)], name == region)
+        np.testing.assert_allclose(mask[GENERIC.mesh.vertices_of(*parts)], name == region)
 
 
 def test_each_eyeball_belongs_to_its_side() -> None:
     for side in ("left", "right"):
-        ball = part_vertices(GENERIC, f"{side}_eyeball")
+        ball = GENERIC.mesh.vertices_of(f"{side}_eyeball")
         np.testing.assert_allclose(DEFAULT[f"{side}_eye"][ball], 1)
 
 

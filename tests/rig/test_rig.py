@@ -12,7 +12,6 @@ from mien.head import Expression, Head
 from mien.mesh import Mesh
 from mien.render.morph import MorphRenderer
 from mien.render.shade import render
-from mien.rig.followers import part_vertices
 from mien.rig.gaze import Eyeball, eye_look_angles, with_turned_eyes
 from mien.rig.regions import default_masks
 from mien.rig.rig import WEIGHTED_REGIONS, Rig, region_rows
@@ -182,7 +181,7 @@ def test_contacts_concern_lids_and_lips_alone() -> None:
     around = np.max(
         [GENERIC.regions[n] for n in ("mouth", "mouth_cavity", "eyes", "eye_socket")], 0
     )
-    lashes = part_vertices(GENERIC, "lashes", "hair")
+    lashes = GENERIC.mesh.vertices_of("lashes", "hair")
     away = np.setdiff1d(np.flatnonzero(around == 0), np.union1d(lashes, EYES))
     np.testing.assert_allclose(touching.vertices[away], through.vertices[away], atol=1e-9)
 
@@ -280,7 +279,7 @@ def test_regions_take_the_nearest_given_weights() -> None:
 
 
 def test_eyes_darken_as_their_lids_close() -> None:
-    left, right = (part_vertices(GENERIC, f"{side}_eyeball") for side in ("left", "right"))
+    left, right = (GENERIC.mesh.vertices_of(f"{side}_eyeball") for side in ("left", "right"))
     faces = [RIG.evaluate(FaceState(units={"eyeBlinkLeft": w})) for w in (0, 0.25, 0.5, 0.75, 1)]
     light = [face.brightness[left[0]] for face in faces]
     assert light[0] == pytest.approx(1)
@@ -288,11 +287,11 @@ def test_eyes_darken_as_their_lids_close() -> None:
     for face in faces:
         assert np.ptp(face.brightness[left]) == 0
         np.testing.assert_allclose(face.brightness[right], 1, atol=0.01)
-        np.testing.assert_array_equal(face.brightness[part_vertices(GENERIC, "skin")], 1)
+        np.testing.assert_array_equal(face.brightness[GENERIC.mesh.vertices_of("skin")], 1)
 
 
 def test_teeth_get_brighter_as_the_mouth_opens() -> None:
-    teeth = part_vertices(GENERIC, "upper_teeth", "lower_teeth", "tongue")
+    teeth = GENERIC.mesh.vertices_of("upper_teeth", "lower_teeth", "tongue")
     faces = [RIG.evaluate(FaceState(units={"jawOpen": w})) for w in (0, 0.1, 0.3)]
     light = [face.brightness[teeth[0]] for face in faces]
     assert light[0] == pytest.approx(1)

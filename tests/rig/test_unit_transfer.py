@@ -8,7 +8,6 @@ from mien.assets.generic import load_generic_head
 from mien.errors import InputError
 from mien.numeric.rotation import rotation_from_vector
 from mien.rig.deformer import fit_units
-from mien.rig.followers import part_vertices
 from mien.rig.unit_transfer import local_stretch, transfer_units
 from people import person
 
@@ -54,7 +53,7 @@ def test_a_wider_mouth_smiles_wider_and_nothing_else_changes() -> None:
 
 def test_what_a_unit_does_not_move_stays() -> None:
     units = transfer_units(GENERIC, person(3))
-    skin = part_vertices(GENERIC, "skin")
+    skin = GENERIC.mesh.vertices_of("skin")
     still = np.abs(GENERIC.unit_offsets[:, skin]).max(axis=2) == 0
     assert not units[:, skin][still].any()
 
@@ -63,7 +62,7 @@ def test_what_a_unit_does_not_move_stays() -> None:
 def test_lower_teeth_move_with_the_jaw_and_stay_behind_the_lower_lip(name: str) -> None:
     head = person(4)
     units = unit(transfer_units(GENERIC, head), name)
-    teeth, chin = part_vertices(GENERIC, "lower_teeth"), GENERIC.vertex_of("chin")
+    teeth, chin = GENERIC.mesh.vertices_of("lower_teeth"), GENERIC.vertex_of("chin")
     front = teeth[np.argsort(-VERTICES[teeth, 2])[:6]]
     moved = np.linalg.norm(units[front], axis=1) / np.linalg.norm(units[chin])
     generic = unit(GENERIC.unit_offsets, name)
@@ -74,13 +73,13 @@ def test_lower_teeth_move_with_the_jaw_and_stay_behind_the_lower_lip(name: str) 
 
 
 def test_teeth_and_tongue_stay_when_the_jaw_does() -> None:
-    parts = part_vertices(GENERIC, "lower_teeth", "upper_teeth", "tongue")
+    parts = GENERIC.mesh.vertices_of("lower_teeth", "upper_teeth", "tongue")
     assert not unit(transfer_units(GENERIC, person(4)), "mouthSmileLeft")[parts].any()
 
 
 def test_the_stretch_of_an_affine_image_is_its_matrix() -> None:
     linear = np.array([[1.1, 0.1, 0.0], [0.0, 0.9, 0.05], [0.02, 0.0, 1.05]])
-    skin = part_vertices(GENERIC, "skin")
+    skin = GENERIC.mesh.vertices_of("skin")
     stretch = local_stretch(GENERIC, VERTICES @ linear.T + 4)[skin]
     np.testing.assert_allclose(stretch, np.broadcast_to(linear, stretch.shape), atol=1e-6)
 

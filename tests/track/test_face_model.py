@@ -9,7 +9,6 @@ import patterned
 from mien.arrays import Array
 from mien.errors import InputError
 from mien.rig.basis import WEIGHT_RANGE
-from mien.rig.followers import part_vertices
 from mien.rig.state import FaceState, Gaze
 from mien.track.face_model import FaceModel, FaceParameters, within_range
 from mien.track.photometric.image_jacobian import POSE_UNKNOWNS
@@ -92,7 +91,7 @@ def test_blinks_shut_their_own_eye(model: FaceModel, unknown: int, side: str) ->
 @pytest.mark.parametrize(("axis", "unknown"), [("yaw", 8), ("pitch", 9)])
 def test_eyes_turn_as_in_the_rig(model: FaceModel, axis: str, unknown: int) -> None:
     """Positive yaw to the subject's left (x), positive pitch up (y)."""
-    step, eyes = 0.05, part_vertices(patterned.GENERIC, "left_eyeball", "right_eyeball")
+    step, eyes = 0.05, patterned.GENERIC.mesh.vertices_of("left_eyeball", "right_eyeball")
     turned = [
         model.rig.evaluate(FaceState(gaze=Gaze(**{axis: by}))).vertices for by in (-step, step)
     ]

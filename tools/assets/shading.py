@@ -51,9 +51,9 @@ def paint_head(mesh: Mesh, lips: Float[Array, " v"], brows: Float[Array, " v"]) 
         colours += mask[:, None] * (np.array(colour) - colours)
     off_axis = np.full(len(mesh.vertices), 99.0)
     for part, colour in (("hair", _HAIR), ("lashes", _HAIR), ("upper_teeth", _SCLERA)):
-        colours[np.unique(mesh.triangles[mesh.triangles_of(part)])] = colour
+        colours[mesh.vertices_of(part)] = colour
     for part in ("left_eyeball", "right_eyeball"):
-        eye = np.unique(mesh.triangles[mesh.triangles_of(part)])
+        eye = mesh.vertices_of(part)
         centre = mesh.vertices[eye].mean(0)
         colours[eye] = _SCLERA
         off_axis[eye] = np.linalg.norm((mesh.vertices[eye] - centre)[:, :2], axis=1)

@@ -28,6 +28,8 @@ def rotation_to_vector(rotation: Float[Array, "*batch 3 3"]) -> Float[Array, "*b
 
     # A copy: SciPy takes no array that is read-only.
     rotation = np.array(rotation, dtype=np.float64)
+    if not rotation.size:
+        return rotation[..., 0]  # No rotation at all: older SciPy refuses that.
     vectors: Array = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_rotvec()
     return vectors.reshape(rotation.shape[:-1])
 

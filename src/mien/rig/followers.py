@@ -14,11 +14,6 @@ _NEIGHBOURS = 4
 _LEAST_MM = 0.2
 
 
-def part_vertices(generic: GenericHead, *parts: str) -> Int[Array, " p"]:
-    """The vertices of the named parts, ascending. Raises: InputError: no such part."""
-    return np.unique(generic.mesh.triangles[generic.mesh.triangles_of(*parts)])
-
-
 @dataclass(frozen=True)
 class Followers:
     """Skinning weights of lashes and hair on the nearest skin vertices.
@@ -38,8 +33,8 @@ class Followers:
         """The followers of the generic topology."""
         from scipy.spatial import cKDTree
 
-        vertices = part_vertices(generic, *_PARTS)
-        skin = part_vertices(generic, "skin")
+        vertices = generic.mesh.vertices_of(*_PARTS)
+        skin = generic.mesh.vertices_of("skin")
         places = generic.mesh.vertices
         distance, nearest = cKDTree(places[skin]).query(places[vertices], k=_NEIGHBOURS)
         weights = 1 / np.maximum(distance, _LEAST_MM) ** 2

@@ -10,7 +10,6 @@ import numpy as np
 from mien.arrays import Array, Float, Int, frozen
 from mien.assets.generic import GenericHead
 from mien.numeric.kernels.jit import njit
-from mien.rig.followers import part_vertices
 
 SIDES = ("left", "right")
 _LID_GAIN = 0.35
@@ -40,7 +39,7 @@ class Eyeball:
     @staticmethod
     def of(generic: GenericHead, vertices: Float[Array, "v 3"], side: str) -> Eyeball:
         """The left or the right eyeball of a head with these vertices, (V, 3) mm."""
-        ball = part_vertices(generic, f"{side}_eyeball")
+        ball = generic.mesh.vertices_of(f"{side}_eyeball")
         source = generic.mesh.vertices[ball] - generic.mesh.vertices[ball].mean(axis=0)
         centre = vertices[ball].mean(axis=0)
         linear = np.linalg.lstsq(source, vertices[ball] - centre, rcond=None)[0].T
@@ -103,7 +102,7 @@ def eye_look_angles(generic: GenericHead) -> dict[str, tuple[float, float]]:
     """
     angles = {}
     for name in EYE_LOOK_UNITS:
-        ball = part_vertices(generic, f"{_side(name)}_eyeball")
+        ball = generic.mesh.vertices_of(f"{_side(name)}_eyeball")
         places = generic.mesh.vertices[ball]
         moved = places + generic.unit_offsets[generic.unit_names.index(name)][ball]
         left, _, right = np.linalg.svd(

@@ -68,7 +68,7 @@ def default_masks(generic: GenericHead) -> dict[str, Float[Array, " v"]]:
     eyes = eyes * (1 - above)
     whole = {"mouth": mouth, "eyes": eyes, "forehead": forehead}
     for part, region in _PARTS.items():
-        inside = np.unique(generic.mesh.triangles[generic.mesh.triangles_of(part)])
+        inside = generic.mesh.vertices_of(part)
         for name, mask in whole.items():
             mask[inside] = name == region
     total = np.maximum(sum(whole.values()), 1.0)

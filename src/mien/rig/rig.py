@@ -14,7 +14,6 @@ from mien.head import NEUTRAL, Head
 from mien.limits import UNIT_RANGE
 from mien.rig.basis import WEIGHT_RANGE, check_weights, outside_hull
 from mien.rig.deformer import FaceDeformer
-from mien.rig.followers import part_vertices
 from mien.rig.regions import ENCLOSING_REGIONS, MASK_NAMES, check_masks, default_masks
 from mien.rig.shading import OpeningMeter, brightness_at
 from mien.rig.sparse_offsets import add_mixture
@@ -282,9 +281,9 @@ def _textures(head: Head, names: Iterable[str]) -> tuple[UInt8[Array, "h w 3"], 
 def _shaded_parts(generic: GenericHead) -> tuple[Array, Array, Array]:
     """Vertices of the left eye, the right eye, and of teeth and tongue."""
     return (
-        part_vertices(generic, "left_eyeball"),
-        part_vertices(generic, "right_eyeball"),
-        part_vertices(generic, "upper_teeth", "lower_teeth", "tongue"),
+        generic.mesh.vertices_of("left_eyeball"),
+        generic.mesh.vertices_of("right_eyeball"),
+        generic.mesh.vertices_of("upper_teeth", "lower_teeth", "tongue"),
     )
 
 

@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix, csr_matrix, diags
 
 from mien.arrays import Array, Bool, Float, Int, check_array
 from mien.assets.generic import GenericHead
-from mien.rig.followers import Followers, part_vertices
+from mien.rig.followers import Followers
 from mien.rig.skin_paths import shortest_path, skin_edges
 
 _SIGMA_MM = 12.0
@@ -55,14 +55,14 @@ def transfer_units(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float
     stretch = local_stretch(generic, vertices)
     units = generic.unit_offsets.astype(np.float64)
     stretched = np.einsum("vij,kvj->kvi", stretch, units)
-    skin = part_vertices(generic, "skin")
+    skin = generic.mesh.vertices_of("skin")
     result = np.zeros_like(units)
     result[:, skin] = _integrated(generic, skin, stretch, units, stretched)
     deviation = result - stretched
     followers = Followers.of(generic)
     result[:, followers.vertices] = stretched[:, followers.vertices] + followers.carried(deviation)
     for name in _RIGID:
-        part = part_vertices(generic, name)
+        part = generic.mesh.vertices_of(name)
         linear = _affine(generic.mesh.vertices[part], vertices[part])
         result[:, part] = units[:, part] @ linear.T
     _follow_jaw(generic, units, deviation, result)
@@ -78,7 +78,7 @@ def local_stretch(generic: GenericHead, vertices: Float[Array, "v 3"]) -> Float[
     from scipy.spatial import cKDTree
 
     source = generic.mesh.vertices
-    skin = part_vertices(generic, "skin")
+    skin = generic.mesh.vertices_of("skin")
     whole = _affine(source[skin], vertices[skin])
     tree = cKDTree(source[skin])
     pairs = tree.sparse_distance_matrix(cKDTree(source), 2 * _SIGMA_MM, output_type="coo_matrix")
@@ -195,16 +195,16 @@ def _follow_jaw(
 ) -> None:
     """Adds to lower teeth and tongue the chin's deviation from the stretched generic motion."""
     chin = _chin(generic)
-    teeth = part_vertices(generic, "lower_teeth")
+    teeth = generic.mesh.vertices_of("lower_teeth")
     jaw = np.abs(units[:, teeth]).max(axis=(1, 2)) > 1.0
     extra = deviation[:, chin].mean(axis=1)
     for name in _JAW_PARTS:
-        result[np.ix_(jaw, part_vertices(generic, name))] += extra[jaw, None]
+        result[np.ix_(jaw, generic.mesh.vertices_of(name))] += extra[jaw, None]
 
 
 def _chin(generic: GenericHead) -> Int[Array, " c"]:
     """Skin that lies on the lower jaw's front."""
-    skin = part_vertices(generic, "skin")
+    skin = generic.mesh.vertices_of("skin")
     distance = np.linalg.norm(
         generic.mesh.vertices[skin] - generic.mesh.vertices[generic.vertex_of("chin")], axis=1
     )

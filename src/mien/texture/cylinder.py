@@ -54,7 +54,7 @@ def fit_cylinder(mesh: Mesh, *parts: str) -> Cylinder:
         InputError: no triangles.
     """
     names = parts or (("skin",) if "skin" in mesh.part_names else mesh.part_names)
-    used = np.unique(mesh.triangles[mesh.triangles_of(*names)])
+    used = mesh.vertices_of(*names)
     if not len(used):
         raise InputError("mesh", "triangles to put a cylinder around", "none")
     points = mesh.vertices[used]

@@ -226,7 +226,7 @@ def _visible_triangles(mesh: Mesh, regions: Mapping[str, Array]) -> tuple[Mesh, 
     apart = regions["scalp"] + regions["neck"]
     counted = (inside > 0.5) & (apart < 0.2)
     for part in inner:
-        counted[np.unique(mesh.triangles[mesh.triangles_of(part)])] = True
+        counted[mesh.vertices_of(part)] = True
     return near, counted[near.triangles].all(axis=1)
 
 
@@ -236,7 +236,7 @@ def _gaze_offsets(mesh: Mesh) -> list[Float[Array, "v 3"]]:
     for axis in ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)):
         move = np.zeros_like(mesh.vertices, np.float64)
         for part in _EYEBALLS:
-            ball = np.unique(mesh.triangles[mesh.triangles_of(part)])
+            ball = mesh.vertices_of(part)
             move[ball] = np.cross(axis, mesh.vertices[ball] - mesh.vertices[ball].mean(axis=0))
         offsets.append(move)
     return offsets

@@ -20,7 +20,7 @@ from mien.rig.state import FaceState
 
 GENERIC = load_generic_head()
 UP = np.array([0.0, 10.0, 0.0])
-SKIN = np.unique(GENERIC.mesh.triangles[GENERIC.mesh.triangles_of("skin")])
+SKIN = GENERIC.mesh.vertices_of("skin")
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,7 @@ class Puppet:
 
     def __init__(self, head: Head) -> None:
         self.head = head
-        self.eye = np.unique(head.mesh.triangles[head.mesh.triangles_of("left_eyeball")])
+        self.eye = head.mesh.vertices_of("left_eyeball")
 
     def evaluate(self, state: FaceState) -> PosedFace:
         vertices = self.head.mesh.vertices.copy()

@@ -6,8 +6,8 @@ from marbled import GENERIC
 from mien.reconstruction.dense.eyeballs import fit_eyeballs
 
 VERTICES = GENERIC.mesh.vertices
-BALL = np.unique(GENERIC.mesh.triangles[GENERIC.mesh.triangles_of("left_eyeball")])
-SKIN = np.unique(GENERIC.mesh.triangles[GENERIC.mesh.triangles_of("skin")])
+BALL = GENERIC.mesh.vertices_of("left_eyeball")
+SKIN = GENERIC.mesh.vertices_of("skin")
 
 
 def inside_mm(vertices: np.ndarray) -> float:

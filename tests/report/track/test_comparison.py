@@ -12,7 +12,6 @@ from mien.errors import InputError
 from mien.head import Head
 from mien.render.picture import HeadRenderer
 from mien.report.track.comparison import draw_tracked_head, face_mask, face_psnr
-from mien.rig.followers import part_vertices
 from mien.track.state import Track, TrackedFrame
 from posable import head
 from tracks import LAYOUT, random_state, track_of
@@ -91,7 +90,7 @@ def test_face_mask_contains_the_visible_face() -> None:
     for name in ("left_ear.3", "right_ear.3"):
         assert not seen(vertices[GENERIC.vertex_of(name)]), name
     for part in ("left_eyeball", "right_eyeball"):
-        assert seen(vertices[part_vertices(GENERIC, part)].mean(axis=0)), part
+        assert seen(vertices[GENERIC.mesh.vertices_of(part)].mean(axis=0)), part
     assert not seen(vertices[vertices[:, 1].argmax()])
     assert not seen(vertices[vertices[:, 1].argmin()])
 

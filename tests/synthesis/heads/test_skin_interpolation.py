@@ -8,7 +8,6 @@ from scipy.spatial import cKDTree
 
 from marbled import GENERIC
 from mien.assets.feature_points import load_feature_layout
-from mien.rig.followers import part_vertices
 from mien.synthesis.heads.feature_points import feature_points_on
 from mien.synthesis.heads.skin_interpolation import (
     behind_lips_and_lids,
@@ -17,7 +16,7 @@ from mien.synthesis.heads.skin_interpolation import (
 )
 from people import person
 
-SKIN = part_vertices(GENERIC, "skin")
+SKIN = GENERIC.mesh.vertices_of("skin")
 COUNT = len(GENERIC.mesh.vertices)
 LAYOUT = load_feature_layout()
 POINTS = feature_points_on(GENERIC.mesh.vertices)
@@ -35,14 +34,14 @@ def test_known_values_stay(rng):
     values = rng.random((COUNT, 2))
     known = outside()
     np.testing.assert_array_equal(harmonic_extension(values, known)[known], values[known])
-    eyes = part_vertices(GENERIC, "left_eyeball", "tongue")
+    eyes = GENERIC.mesh.vertices_of("left_eyeball", "tongue")
     np.testing.assert_array_equal(harmonic_extension(values, known)[eyes], values[eyes])
 
 
 def test_a_constant_is_extended_inside_and_to_lashes():
     values = np.where(outside()[:, None], 3.0, np.nan)
     extended = harmonic_extension(np.nan_to_num(values), outside())
-    hair = part_vertices(GENERIC, "lashes", "hair")
+    hair = GENERIC.mesh.vertices_of("lashes", "hair")
     np.testing.assert_allclose(extended[np.concatenate([SKIN, hair])], 3)
 
 
@@ -72,7 +71,7 @@ def test_skin_moves_with_its_points(rng):
 
 def test_the_same_displacement_of_all_points_moves_the_face():
     along = thin_plate_weights().sum(axis=1)
-    face = part_vertices(GENERIC, "skin")
+    face = GENERIC.mesh.vertices_of("skin")
     inside = GENERIC.regions["mouth_cavity"] + GENERIC.regions["eye_socket"]
     near = cKDTree(POINTS).query(GENERIC.mesh.vertices)[0] < 8
     face = face[(near & (inside == 0) & (GENERIC.mesh.vertex_normals()[:, 2] > 0.3))[face]]
@@ -83,4 +82,4 @@ def test_the_same_displacement_of_all_points_moves_the_face():
 
 @pytest.mark.parametrize("part", ["left_eyeball", "upper_teeth", "tongue"])
 def test_other_parts_than_skin_stay(part):
-    assert not thin_plate_weights()[part_vertices(GENERIC, part)].any()
+    assert not thin_plate_weights()[GENERIC.mesh.vertices_of(part)].any()

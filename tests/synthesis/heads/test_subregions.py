@@ -7,11 +7,10 @@ import pytest
 
 from marbled import GENERIC
 from mien.assets.feature_points import load_feature_layout
-from mien.rig.followers import part_vertices
 from mien.synthesis.heads.subregions import head_subregions
 
 HERE = head_subregions()
-SKIN = part_vertices(GENERIC, "skin")
+SKIN = GENERIC.mesh.vertices_of("skin")
 
 
 def weight(name):
@@ -46,7 +45,7 @@ def test_left_is_right_mirrored():
     ],
 )
 def test_eyes_and_teeth_are_subregions_of_their_own(part, name):
-    np.testing.assert_array_equal(weight(name)[part_vertices(GENERIC, part)], 1)
+    np.testing.assert_array_equal(weight(name)[GENERIC.mesh.vertices_of(part)], 1)
     np.testing.assert_array_equal(weight(name)[SKIN], 0)
 
 
@@ -81,5 +80,5 @@ def test_there_is_no_step_on_the_skin_off_the_lips():
 
 
 def test_lashes_belong_to_the_lids():
-    lashes = part_vertices(GENERIC, "lashes")
+    lashes = GENERIC.mesh.vertices_of("lashes")
     assert (weight("left_lids") + weight("right_lids"))[lashes].min() > 0.9

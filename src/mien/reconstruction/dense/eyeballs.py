@@ -29,7 +29,7 @@ def fit_eyeballs(vertices: Float[Array, "v 3"], generic: GenericHead) -> Float[A
     """
     result = vertices.copy()
     for name in _EYEBALLS:
-        ball = np.unique(generic.mesh.triangles[generic.mesh.triangles_of(name)])
+        ball = generic.mesh.vertices_of(name)
         lids, gap = _lids(ball, generic)
         shape = generic.mesh.vertices[ball] - generic.mesh.vertices[ball].mean(axis=0)
         prior_mean = float(np.linalg.norm(shape, axis=1).max())

@@ -115,7 +115,7 @@ def _spatial_modes(generic: GenericHead, sign: int) -> Float[Array, "m v"]:
 def _spread_vertices(generic: GenericHead) -> Array:
     """Vertices of one half of the skin, each far from those before it."""
     vertices = generic.mesh.vertices
-    skin = np.unique(generic.mesh.triangles[generic.mesh.triangles_of("skin")])
+    skin = generic.mesh.vertices_of("skin")
     half = skin[(vertices[skin, 2] > _BACK_Z_MM) & (vertices[skin, 0] <= 1e-6)]
     chosen, distance = [int(half[0])], np.full(len(half), np.inf)
     for _ in range(_CENTRES - 1):

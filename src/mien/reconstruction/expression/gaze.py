@@ -31,7 +31,7 @@ def iris_directions(
     points = generic.landmark_positions(vertices)
     directions = np.empty((2, 3))
     for row, (name, iris) in enumerate(EYEBALLS.items()):
-        ball = vertices[np.unique(generic.mesh.triangles[generic.mesh.triangles_of(name)])]
+        ball = vertices[generic.mesh.vertices_of(name)]
         centre = ball.mean(axis=0)
         # A person's eyeball is no sphere: what counts is how far from its centre the iris lies.
         radius = float(np.linalg.norm(points[iris] - centre))

@@ -58,7 +58,7 @@ def _far_vertices(
     vertices: Float[Array, "v 3"], sources: Float[Array, "n 3"], generic: GenericHead
 ) -> Array:
     """Skin vertices far from any feature, spread out (farthest-point order)."""
-    skin = np.unique(generic.mesh.triangles[generic.mesh.triangles_of("skin")])
+    skin = generic.mesh.vertices_of("skin")
     far = skin[cKDTree(sources).query(vertices[skin])[0] > ANCHOR_DISTANCE_MM]
     if len(far) == 0:
         return np.zeros(0, np.int64)
@@ -77,14 +77,14 @@ def with_round_eyes(
     """The moved head, each eyeball moved, turned and scaled as a whole."""
     result = moved.copy()
     for name in _EYEBALLS:
-        ball = np.unique(generic.mesh.triangles[generic.mesh.triangles_of(name)])
+        ball = generic.mesh.vertices_of(name)
         result[ball] = estimate_similarity(before[ball], moved[ball])(before[ball])
     return result
 
 
 def eye_centers(mesh: Mesh) -> Float[Array, "2 3"]:
     """(2, 3) mm: centres of the left and the right eyeball."""
-    balls = [np.unique(mesh.triangles[mesh.triangles_of(name)]) for name in _EYEBALLS]
+    balls = [mesh.vertices_of(name) for name in _EYEBALLS]
     return np.stack([mesh.vertices[ball].mean(axis=0) for ball in balls])
 
 

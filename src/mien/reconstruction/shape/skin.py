@@ -47,7 +47,7 @@ def deform_skin(
         across_sd_mm: how far the skin may move along its normals; None leaves it free.
     """
     mesh = generic.mesh.with_vertices(vertices)
-    skin = np.unique(mesh.triangles[mesh.triangles_of("skin")])
+    skin = mesh.vertices_of("skin")
     number = np.full(len(vertices), -1)
     number[skin] = np.arange(len(skin))
     stiffness = _stiffness(mesh, skin, held, across_sd_mm)

@@ -10,7 +10,7 @@ import numpy as np
 from mien.arrays import Array, Bool, Float, frozen
 from mien.assets.generic import load_generic_head
 from mien.reconstruction.dense.surface import cotangent_laplacian
-from mien.rig.followers import Followers, part_vertices
+from mien.rig.followers import Followers
 from mien.synthesis.heads.feature_points import feature_point_matrix
 
 __all__ = ["behind_lips_and_lids", "harmonic_extension", "thin_plate_weights"]
@@ -37,7 +37,7 @@ def thin_plate_weights() -> Float[Array, "v n"]:
     from scipy.sparse.linalg import splu
 
     generic = load_generic_head()
-    mesh, skin = generic.mesh, part_vertices(generic, "skin")
+    mesh, skin = generic.mesh, generic.mesh.vertices_of("skin")
     laplacian, areas = cotangent_laplacian(mesh.vertices, mesh.triangles[mesh.triangles_of("skin")])
     laplacian, areas = laplacian[skin][:, skin], areas[skin]
     bending = laplacian.T @ diags_array(1 / areas) @ laplacian + diags_array(areas / _REACH_MM**4)
@@ -75,7 +75,7 @@ def harmonic_extension(
     from scipy.sparse.linalg import splu
 
     generic = load_generic_head()
-    skin, count = part_vertices(generic, "skin"), len(generic.mesh.vertices)
+    skin, count = generic.mesh.vertices_of("skin"), len(generic.mesh.vertices)
     triangles = generic.mesh.triangles[generic.mesh.triangles_of("skin")]
     edges = np.vstack([triangles[:, [a, b]] for a in range(3) for b in range(3) if a != b])
     edges = np.unique(edges, axis=0)
@@ -96,7 +96,7 @@ def _fill_eye_sockets(values: Float[Array, "v k"]) -> None:
     from scipy.spatial import cKDTree
 
     generic = load_generic_head()
-    vertices, skin = generic.mesh.vertices, part_vertices(generic, "skin")
+    vertices, skin = generic.mesh.vertices, generic.mesh.vertices_of("skin")
     sockets = skin[generic.regions["eye_socket"][skin] >= 0.5]
     visible = skin[~behind_lips_and_lids()[skin]]
     distance, nearest = cKDTree(vertices[visible]).query(vertices[sockets], k=_NEIGHBOURS)

@@ -11,7 +11,6 @@ from mien.arrays import Array, Bool, Float, Int, frozen
 from mien.assets.feature_points import load_feature_layout
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.assets.subregions import default_subregions
-from mien.rig.followers import part_vertices
 from mien.synthesis.heads.feature_points import feature_points_on
 from mien.synthesis.heads.skin_interpolation import behind_lips_and_lids, harmonic_extension
 
@@ -72,7 +71,7 @@ def head_subregions() -> HeadSubregions:
     drawn_on = _drawn_on(generic) & (total[:, 0] > _MIN_COVERAGE)
     fades = harmonic_extension(fades / np.maximum(total, _MIN_COVERAGE), drawn_on)
     for part, name in _PARTS.items():
-        fades[part_vertices(generic, part)] = np.array(drawn.names) == name
+        fades[generic.mesh.vertices_of(part)] = np.array(drawn.names) == name
     swapped = [drawn.names.index(_other_side(name)) for name in drawn.names]
     fades = (fades + fades[generic.mirror][:, swapped]) / 2
     fades /= fades.sum(axis=1, keepdims=True)
@@ -92,7 +91,7 @@ def _drawn_on(generic: GenericHead) -> Bool[Array, " v"]:
     """Skin that faces the front and is not hidden by lips or lids."""
     facing: Array = (generic.mesh.vertex_normals()[:, 2] > _MIN_FACING) & ~behind_lips_and_lids()
     skin = np.zeros(len(facing), bool)
-    skin[part_vertices(generic, "skin")] = True
+    skin[generic.mesh.vertices_of("skin")] = True
     return facing & skin
 
 

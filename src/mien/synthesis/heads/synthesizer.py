@@ -12,7 +12,6 @@ from mien.assets.feature_points import load_feature_layout
 from mien.assets.generic import load_generic_head
 from mien.head import Head
 from mien.reconstruction.expression.gaze import MAX_GAZE_RAD, yaw_pitch_from_directions
-from mien.rig.followers import part_vertices
 from mien.rig.gaze import SIDES
 from mien.rig.rig import Rig
 from mien.rig.state import PosedFace
@@ -175,7 +174,7 @@ class HeadSynthesizer:
         self, vertices: Float[Array, "v 3"], points: Float[Array, "n 3"]
     ) -> Float[Array, "2 2"]:
         """(2, 2) rad, yaw and pitch by which each eye rotates to bring its pupil to its point."""
-        balls = [part_vertices(load_generic_head(), f"{side}_eyeball") for side in SIDES]
+        balls = [load_generic_head().mesh.vertices_of(f"{side}_eyeball") for side in SIDES]
         centres = np.array([vertices[ball].mean(axis=0) for ball in balls])
         pupils = [self.layout.index(f"{side}_pupil") for side in SIDES]
         directions = np.stack([points[pupils], feature_points_on(vertices)[pupils]]) - centres

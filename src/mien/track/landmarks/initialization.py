@@ -23,7 +23,6 @@ from mien.reconstruction.expression.gaze import (
     direction_to_iris,
     yaw_pitch_from_directions,
 )
-from mien.rig.followers import part_vertices
 from mien.rig.gaze import SIDES
 from mien.rig.rig import Rig
 from mien.track.landmarks.detector_bias import DetectorProbe
@@ -212,7 +211,7 @@ class _GazeEstimator:
         self, head: Head, rig: Rig, layout: Layout, positions: Float[Array, "478 3"]
     ) -> None:
         generic = load_generic_head()
-        balls = [part_vertices(generic, f"{side}_eyeball") for side in SIDES]
+        balls = [generic.mesh.vertices_of(f"{side}_eyeball") for side in SIDES]
         self._centres = np.array([head.mesh.vertices[ball].mean(axis=0) for ball in balls])
         forward = positions[_IRISES] - self._centres
         self._radii = np.linalg.norm(forward, axis=1)
