@@ -26,7 +26,7 @@ from mien.io.head.head_folder import load_head
 from mien.render.picture import HeadRenderer
 from mien.report.track.comparison import draw_tracked_head, face_psnr
 from mien.track.series import series_of
-from mien.track.smoothing import smooth
+from mien.track.smoothing import smooth_track
 from mien.track.state import Track
 
 VIDEOS = DATA / "videos"
@@ -179,7 +179,7 @@ def tremble(clip: Clip, renderer: HeadRenderer) -> Tremble:
     ]
     return Tremble(
         _tracked_jitter(clip.followed.track, renderer, still),
-        _tracked_jitter(smooth(clip.followed.track, SMOOTH), renderer, still),
+        _tracked_jitter(smooth_track(clip.followed.track, SMOOTH), renderer, still),
         _jitter_of(peer, still),
         _jitter_of(alone, still),
     )

@@ -11,8 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from mien.animate.perform import moved_camera
-from mien.animate.sample import SAMPLE_TIMELINE
+from mien.animate.perform import moved_camera, sample_timeline
 from mien.arrays import Array
 from mien.io.files.image import save_image
 from mien.io.timeline.timeline_json import load_timeline_json
@@ -48,7 +47,7 @@ def _look(head: HeadRenderer, *, yaw: float, state: FaceState | None = None) -> 
 
 def _performing(head: HeadRenderer) -> list[Array]:
     """Frames of the sample timeline, without the empty sides."""
-    timeline = load_timeline_json(SAMPLE_TIMELINE)
+    timeline = load_timeline_json(sample_timeline())
     camera, pictures = head.camera(size=_SIZE), []
     for time in _SECONDS:
         moment = timeline.at(time)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mien.animate.perform import frame_times
-from mien.animate.sample import SAMPLE_TIMELINE
+from mien.animate.perform import frame_times, sample_timeline
 from mien.animate.timeline import Timeline
 from mien.assets.generic import load_generic_head
 from mien.io.timeline.timeline_file import check_timeline
@@ -15,7 +14,7 @@ from mien.io.timeline.timeline_json import load_timeline_json
 
 @pytest.fixture(scope="module")
 def sample() -> Timeline:
-    return load_timeline_json(SAMPLE_TIMELINE)
+    return load_timeline_json(sample_timeline())
 
 
 def test_it_lasts_ten_seconds_and_uses_everything(sample: Timeline) -> None:

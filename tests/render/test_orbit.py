@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mien.errors import InputError
-from mien.render.orbit import orbit_camera, turntable
+from mien.render.orbit import orbit_camera, turntable_cameras
 from shapes import ellipsoid
 
 VERTICES = ellipsoid().vertices + np.array([3.0, -40, -60])
@@ -48,7 +48,7 @@ def test_everything_is_in_the_picture(yaw: float, pitch: float, size: tuple[int,
 
 
 def test_a_turntable_goes_once_around_and_keeps_its_scale() -> None:
-    cameras = list(turntable(8, width=100, height=120, vertices=VERTICES))
+    cameras = list(turntable_cameras(8, width=100, height=120, vertices=VERTICES))
     assert len(cameras) == 8
     middle = (VERTICES.min(axis=0) + VERTICES.max(axis=0)) / 2
     distances = [np.linalg.norm(camera.center - middle) for camera in cameras]
@@ -67,4 +67,4 @@ def test_bad_input_is_refused() -> None:
     with pytest.raises(InputError, match="width: expected a number above zero"):
         orbit_camera(0, width=0, height=10, vertices=VERTICES)
     with pytest.raises(InputError, match="frames: expected a number above zero"):
-        list(turntable(0, width=10, height=10, vertices=VERTICES))
+        list(turntable_cameras(0, width=10, height=10, vertices=VERTICES))

@@ -10,7 +10,7 @@ import pytest
 
 from mien.errors import InputError
 from mien.numeric.rotation import angle_between, rotation_from_vector
-from mien.track.smoothing import LiveFilter, smooth
+from mien.track.smoothing import LiveFilter, smooth_track
 from mien.track.state import Track, TrackedFrame, TrackState
 from tracks import random_state, random_track, track_of
 
@@ -52,7 +52,7 @@ def assert_same_state(found: TrackState, given: TrackState, tolerance: float = 1
 def test_steady_motion_stays_at_any_rate(rng: np.random.Generator, varying: np.ndarray) -> None:
     for times in (EVEN, varying):
         track, _ = moving(rng, times)
-        for found, given in zip(smooth(track, 0.1).frames, track.frames, strict=True):
+        for found, given in zip(smooth_track(track, 0.1).frames, track.frames, strict=True):
             assert_same_state(found.state, given.state)
             others = [field.name for field in fields(TrackedFrame) if field.name != "state"]
             assert all(getattr(found, name) is getattr(given, name) for name in others)
@@ -60,7 +60,7 @@ def test_steady_motion_stays_at_any_rate(rng: np.random.Generator, varying: np.n
 
 def test_a_face_that_keeps_still_stays(rng: np.random.Generator) -> None:
     track = track_of([random_state(rng)] * 10, rng)
-    for found, given in zip(smooth(track, 0.2).frames, track.frames, strict=True):
+    for found, given in zip(smooth_track(track, 0.2).frames, track.frames, strict=True):
         assert_same_state(found.state, given.state)
 
 
@@ -74,7 +74,7 @@ def test_noise_falls_as_stated(rng: np.random.Generator) -> None:
         )
         for _ in range(400)
     ]
-    calm = [f.state for f in smooth(track_of(shaken, rng), 0.2).frames]
+    calm = [f.state for f in smooth_track(track_of(shaken, rng), 0.2).frames]
     off = np.array([state.t_cam_head - still.t_cam_head for state in calm])
     assert off.std() == pytest.approx(0.53 / np.sqrt(0.2 * 25), rel=0.2)
     turned = [angle_between(state.R_cam_head, still.R_cam_head) for state in calm]
@@ -85,7 +85,9 @@ def test_noise_falls_as_stated(rng: np.random.Generator) -> None:
 def test_a_pulse_spreads_evenly_to_both_sides(rng: np.random.Generator) -> None:
     still = random_state(rng)
     rest, pulse = replace(still, units=np.zeros(2)), replace(still, units=np.ones(2))
-    frames = smooth(track_of([pulse if n == 20 else rest for n in range(41)], rng), 0.08).frames
+    frames = smooth_track(
+        track_of([pulse if n == 20 else rest for n in range(41)], rng), 0.08
+    ).frames
     jaw = np.array([frame.state.units[0] for frame in frames])
     np.testing.assert_allclose(jaw, jaw[::-1], atol=1e-12)
     assert jaw.argmax() == 20
@@ -93,7 +95,7 @@ def test_a_pulse_spreads_evenly_to_both_sides(rng: np.random.Generator) -> None:
 
 
 def test_weights_keep_their_sum(rng: np.random.Generator) -> None:
-    for frame in smooth(random_track(rng), 0.1).frames:
+    for frame in smooth_track(random_track(rng), 0.1).frames:
         if frame.state is not None:
             np.testing.assert_allclose(frame.state.weights.sum(axis=1), 1, atol=1e-12)
 
@@ -105,7 +107,7 @@ def test_nothing_is_smoothed_across_a_loss(rng: np.random.Generator) -> None:
     frames = list(found_anew.frames)
     frames[5] = replace(frames[5], status="reacquired")
     for given in (track, replace(found_anew, frames=tuple(frames))):
-        for found, wanted in zip(smooth(given, 0.2).frames, given.frames, strict=True):
+        for found, wanted in zip(smooth_track(given, 0.2).frames, given.frames, strict=True):
             assert found.status == wanted.status
             assert (found.state is None) == (wanted.state is None)
             if wanted.state is not None:
@@ -115,7 +117,7 @@ def test_nothing_is_smoothed_across_a_loss(rng: np.random.Generator) -> None:
 def test_short_tracks_stay(rng: np.random.Generator) -> None:
     for count in range(3):
         track = track_of([random_state(rng) for _ in range(count)], rng)
-        for found, given in zip(smooth(track, 0.1).frames, track.frames, strict=True):
+        for found, given in zip(smooth_track(track, 0.1).frames, track.frames, strict=True):
             assert_same_state(found.state, given.state)
 
 
@@ -154,12 +156,12 @@ def test_the_live_filter_starts_anew_after_a_loss(rng: np.random.Generator) -> N
 def test_frames_of_one_time_do_not_break_it(rng: np.random.Generator) -> None:
     track = track_of([random_state(rng)] * 3, rng, times=[0.0, 0.0, 0.0])
     live = LiveFilter(0.1)
-    for found in (*smooth(track, 0.1).frames, *map(live.step, track.frames)):
+    for found in (*smooth_track(track, 0.1).frames, *map(live.step, track.frames)):
         assert_same_state(found.state, track.frames[0].state)
 
 
 def test_bad_lengths_are_refused(rng: np.random.Generator) -> None:
     with pytest.raises(InputError, match="seconds: expected a number above zero"):
-        smooth(random_track(rng), 0.0)
+        smooth_track(random_track(rng), 0.0)
     with pytest.raises(InputError, match="lag: expected a number above zero"):
         LiveFilter(-1.0)

@@ -101,21 +101,15 @@ class Curve:
             _given(self.slopes_out) * factor,
         )
 
-    def baked(self, times: Float[Array, " n"]) -> Curve:
-        """The curve sampled at these rising times, with linear interpolation."""
-        return sampled(times, self.at(times))
-
 
 def constant(value: float) -> Curve:
     """The same value at all times."""
     return Curve(np.zeros(1), np.array([value]))
 
 
-def sampled(
-    times: Float[Array, " n"], values: Float[Array, " n"], interpolation: Interpolation = "linear"
-) -> Curve:
-    """A curve with a key at each of these times, all of one interpolation."""
-    return Curve(times, values, (interpolation,) * len(times))
+def sampled(times: Float[Array, " n"], values: Float[Array, " n"]) -> Curve:
+    """A curve through these values, with linear interpolation."""
+    return Curve(times, values, ("linear",) * len(times))
 
 
 def _hermite(u: Array, a: Array, b: Array, leaving: Array, arriving: Array) -> Array:

@@ -1,8 +1,10 @@
-"""The frames of a timeline, and the camera relative to the moved head."""
+"""The frames of a timeline, the camera relative to the moved head, and a timeline to try."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 
@@ -11,6 +13,14 @@ from mien.arrays import Array, Float, check_positive
 from mien.camera import Camera
 from mien.errors import InputError
 from mien.limits import MAX_FPS, MAX_FRAMES
+
+
+def sample_timeline() -> Path:
+    """The file of the timeline that ships with mien; it has only units, so that it fits any head.
+
+    Ten seconds: a silent sentence, a look around, a smile, raised brows; blinking and breathing.
+    """
+    return Path(str(files("mien.assets"))) / "data" / "sample_timeline.json"
 
 
 def frame_times(timeline: Timeline, fps: float | None = None) -> Float[Array, " n"]:

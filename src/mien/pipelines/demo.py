@@ -8,7 +8,7 @@ from math import radians
 from pathlib import Path
 from typing import TypedDict
 
-from mien.animate.sample import SAMPLE_TIMELINE
+from mien.animate.perform import sample_timeline
 from mien.head import Head
 from mien.io.files.atomic import atomic_folder, check_folder_place
 from mien.io.files.image import save_image
@@ -70,13 +70,13 @@ def run_demo(folder: Path, *, progress: Progress) -> Path:
         progress(_STAGE, 2, 2)
         animate_head(
             head,
-            SAMPLE_TIMELINE,
+            sample_timeline(),
             temporary / PERFORMANCE,
             fps=_FPS,
             **_RENDER_OPTIONS,
             progress=progress,
         )
-        shutil.copy(SAMPLE_TIMELINE, temporary)
+        shutil.copy(sample_timeline(), temporary)
         page = _page(head, pictures)
         (temporary / "index.html").write_text(page, encoding="utf-8")
     return folder / "index.html"

@@ -22,7 +22,7 @@ from mien.pipelines.tracking.run import TRACKING, TrackRun
 from mien.progress import Progress, no_progress
 from mien.reading.names import check_path
 from mien.track.lens import parse_lens
-from mien.track.smoothing import smooth
+from mien.track.smoothing import smooth_track
 from mien.track.state import STATUSES, Status, Track
 from mien.track.tracker import TrackOptions
 
@@ -93,7 +93,7 @@ def track_video(
         head: of the person in it.
         files: where the results go, each written whole or not at all.
         lens: as for track.lens.parse_lens; estimated over the first frames unless given.
-        smooth_seconds: as track.smoothing.smooth; nothing is smoothed unless given.
+        smooth_seconds: as track.smoothing.smooth_track; nothing is smoothed unless given.
         resume: go on where an earlier run was stopped; from the start where there was none.
         options: of the tracker.
         max_side: px; larger pictures are tracked reduced to it.
@@ -132,7 +132,7 @@ def track_video(
             frames = run.track_frames(tracker, journal, kept, report)
             seconds = time.perf_counter() - start
             track = run.track(tracker.layout, frames)
-            smoothed = track if smooth_seconds is None else smooth(track, smooth_seconds)
+            smoothed = track if smooth_seconds is None else smooth_track(track, smooth_seconds)
             other_faces_seen = tracker.other_faces_seen
             notes += [*clip.notes, *track_notes(track, head, other_faces_seen=other_faces_seen)]
             notes += files.write(smoothed, clip, head, report)

@@ -25,8 +25,9 @@ def orbit_camera(
     """A camera that sees all vertices, with the middle of their bounding box in its centre.
 
     Args:
-        yaw: radians; positive sees more of the subject's left side.
-        pitch: radians; positive looks down from above.
+        yaw: radians; positive moves the camera to the subject's left, so it is the opposite of
+            `render_head`'s yaw, which turns the head.
+        pitch: radians; positive looks down from above, as `render_head`'s.
         roll: radians; positive turns the head counter-clockwise in the picture.
         width: px.
         height: px.
@@ -63,7 +64,7 @@ def orbit_camera(
     return Camera(width, height, float(focal), rotation, position)
 
 
-def turntable(
+def turntable_cameras(
     frames: int,
     *,
     width: int,

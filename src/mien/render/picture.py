@@ -14,7 +14,7 @@ from mien.errors import InputError
 from mien.head import Head
 from mien.limits import MAX_SIDE
 from mien.render.morph import MorphRenderer
-from mien.render.orbit import orbit_camera, turntable
+from mien.render.orbit import orbit_camera, turntable_cameras
 from mien.rig.rig import Rig
 from mien.rig.state import FACE, FaceState, PosedFace
 
@@ -145,7 +145,9 @@ def turntable_frames(
         background: sRGB.
     """
     renderer, (width, height) = HeadRenderer(head), size
-    for camera in turntable(frames, width=width, height=height, vertices=head.mesh.vertices):
+    for camera in turntable_cameras(
+        frames, width=width, height=height, vertices=head.mesh.vertices
+    ):
         picture = renderer.draw(FaceState(), camera, background=background)
         yield np.ascontiguousarray(picture[..., :3])
 

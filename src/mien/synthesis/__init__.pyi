@@ -9,8 +9,10 @@ from mien.io.examples.example_folder import save_examples as save_examples
 from mien.pipelines.examples import ExampleRequest as ExampleRequest
 from mien.pipelines.examples import GatheredExamples as GatheredExamples
 from mien.pipelines.examples import gather_examples as gather_examples
+from mien.pipelines.examples import save_example_folder as save_example_folder
 from mien.pipelines.synthesize import SynthesizedPicture as SynthesizedPicture
 from mien.pipelines.synthesize import synthesize_expression as synthesize_expression
+from mien.pipelines.synthesize_head import HeadView as HeadView
 from mien.pipelines.synthesize_head import SynthesizedHeadPicture as SynthesizedHeadPicture
 from mien.pipelines.synthesize_head import synthesize_head as synthesize_head
 from mien.synthesis.examples.example_set import Example as Example

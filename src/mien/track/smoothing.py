@@ -17,7 +17,7 @@ _EDGE = 1e-6
 """Seconds more, so that a frame at the very edge counts on both sides or on none."""
 
 
-def smooth(track: Track, seconds: float) -> Track:
+def smooth_track(track: Track, seconds: float) -> Track:
     """The track with states smoothed over time, without lag.
 
     Each number becomes that of the straight line that fits it best around the frame, by a symmetric
