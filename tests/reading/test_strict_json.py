@@ -14,10 +14,7 @@ from mien.errors import DocumentError, FileFormatError, InputError
 from mien.limits import MAX_CONTAINERS, MAX_DEPTH, MAX_DIGITS, MAX_JSON_BYTES
 from mien.reading.strict_json import (
     DocumentFormat,
-    as_array,
-    as_names,
-    as_number,
-    as_whole,
+    JsonValue,
     errors_name_file,
     read_json,
     unknown_name,
@@ -99,39 +96,41 @@ def test_the_largest_documents_are_read_in_seconds(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["NaN", "Infinity", "-Infinity", "1e999", "1" * 400])
 def test_numbers_that_are_not_finite_are_refused_with_their_place(text: str) -> None:
     with pytest.raises(DocumentError, match=r"a\[1\]: expected a finite number, found (nan|-?inf)"):
-        as_array(json.loads(f"[1, {text}]"), "a", (2,))
+        JsonValue(json.loads(f"[1, {text}]"), "a").array(2)
 
 
 def test_limits_of_numbers() -> None:
-    assert as_number(1, "a", least=0, most=1) == 1.0
+    assert JsonValue(1, "a").number(least=0, most=1) == 1.0
     with pytest.raises(DocumentError, match=r"a: expected a number from -0\.5 to 1\.5, found 50"):
-        as_number(50, "a", least=-0.5, most=1.5)
+        JsonValue(50, "a").number(least=-0.5, most=1.5)
     with pytest.raises(DocumentError, match="a: expected a number above 0 and at most 10, found 0"):
-        as_number(0, "a", above=0, most=10)
+        JsonValue(0, "a").number(above=0, most=10)
     limits = r"from -1e\+09 to 1e\+09"
     with pytest.raises(DocumentError, match=rf"a: expected a number {limits}, found 1e\+30"):
-        as_number(10**30, "a")
+        JsonValue(10**30, "a").number()
     for value in (True, 1.5, "1", None):
         with pytest.raises(DocumentError, match="a: expected a whole number, found "):
-            as_whole(value, "a")
+            JsonValue(value, "a").whole()
 
 
 def test_arrays_have_the_shape_that_is_expected() -> None:
-    np.testing.assert_array_equal(as_array([[1, 2.5], [3, 4]], "a", (2, 2)), [[1, 2.5], [3, 4]])
+    np.testing.assert_array_equal(
+        JsonValue([[1, 2.5], [3, 4]], "a").array(2, 2), [[1, 2.5], [3, 4]]
+    )
     with pytest.raises(DocumentError, match="a: expected 2 lists, found 1"):
-        as_array([[1, 2]], "a", (2, 2))
+        JsonValue([[1, 2]], "a").array(2, 2)
     with pytest.raises(DocumentError, match=r"a\[1\]: expected 2 numbers, found 3"):
-        as_array([[1, 2], [3, 4, 5]], "a", (2, 2))
+        JsonValue([[1, 2], [3, 4, 5]], "a").array(2, 2)
     with pytest.raises(DocumentError, match=r"a\[0\]\[1\]: expected a number, found true or false"):
-        as_array([[1, True], [3, 4]], "a", (2, 2))
+        JsonValue([[1, True], [3, 4]], "a").array(2, 2)
 
 
 def test_names_are_there_once() -> None:
-    assert as_names(["a", "b"], "parts") == ("a", "b")
+    assert JsonValue(["a", "b"], "parts").names() == ("a", "b")
     with pytest.raises(DocumentError, match="parts: 'a' appears twice"):
-        as_names(["a", "b", "a"], "parts")
+        JsonValue(["a", "b", "a"], "parts").names()
     with pytest.raises(DocumentError, match=r"parts\[1\]: expected text, found null"):
-        as_names(["a", None], "parts")
+        JsonValue(["a", None], "parts").names()
 
 
 def test_names_of_a_million_letters_are_cut_short() -> None:
@@ -143,7 +142,7 @@ def test_names_of_a_million_letters_are_cut_short() -> None:
 def test_a_format_is_that_of_its_header(tmp_path: Path) -> None:
     format = DocumentFormat("mien thing", 2)
     for version in (1, 2):
-        format.check(format.header | {"version": version})
+        format.check(JsonValue(format.header | {"version": version}))
     path = tmp_path / "a.json"
     path.write_text(json.dumps(format.header | {"version": 3}))
     assert format.is_in(path), "of whatever version"
@@ -152,9 +151,9 @@ def test_a_format_is_that_of_its_header(tmp_path: Path) -> None:
         assert not format.is_in(path)
     assert not format.is_in(tmp_path / "nothing.json")
     with pytest.raises(DocumentError, match="format: expected 'mien thing', found 'mien head'"):
-        format.check({"format": "mien head"})
+        format.check(JsonValue({"format": "mien head"}))
     with pytest.raises(DocumentError, match="version: 3 was written by a newer mien"):
-        format.check(format.header | {"version": 3})
+        format.check(JsonValue(format.header | {"version": 3}))
 
 
 @pytest.mark.parametrize("error", [DocumentError("a", "expected b"), InputError("a", "b", "c")])

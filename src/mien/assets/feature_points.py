@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from mien.arrays import Array, Float, Int, check_array, frozen
-from mien.assets.data_file import affine_weights, read_data, typed_entry
+from mien.assets.data_file import affine_weights, read_data
 from mien.assets.landmark_sets import LANDMARK_COUNT
 from mien.errors import DocumentError, InputError
 from mien.numeric.planar_similarity import estimate_planar_similarity
+from mien.reading.strict_json import JsonValue
 
 __all__ = ["FeatureLayout", "load_feature_layout"]
 
@@ -62,7 +63,7 @@ class FeatureLayout:
 
     @cached_property
     def face_triangles(self) -> Int[Array, "t 3"]:
-        """(T, 3) those of the triangles that typed_entry no point of `frame`."""
+        """(T, 3) those of the triangles that need no point of `frame`."""
         return frozen(self.triangles[(self.triangles < len(self.names)).all(axis=1)])
 
     def index(self, name: str) -> int:
@@ -113,47 +114,46 @@ def load_feature_layout(path: str | Path | None = None) -> FeatureLayout:
     return read_data(Path(path or shipped), _FORMAT, _layout)
 
 
-def _layout(document: dict[str, Any]) -> FeatureLayout:
-    points = typed_entry(document, "points", list)
-    names = tuple(typed_entry(p, "name", str, f"points[{i}]") for i, p in enumerate(points))
+def _layout(document: JsonValue) -> FeatureLayout:
+    points = document["points"].items()
+    names = tuple(point["name"].text() for point in points)
     for name in names:
         if names.count(name) > 1:
             raise DocumentError("points", f"{name!r} appears twice")
-    frame = _points_2d(typed_entry(document, "frame", list), "frame")
-    sets = _sets(typed_entry(document, "sets", list), names)
+    points = [JsonValue(point.raw, name) for point, name in zip(points, names, strict=True)]
+    frame = _points_2d(document["frame"].items(), "frame")
+    sets = _sets(document["sets"].items(), names)
     return FeatureLayout(
-        name=typed_entry(document, "name", str),
+        name=document["name"].text(),
         names=names,
         sets=tuple(tuple(level.values()) for level in sets),
         set_names=tuple(tuple(level) for level in sets),
         mirror=_mirror(points, names),
-        template=_points_2d(
-            [typed_entry(p, "template", list, p["name"]) for p in points], "template"
-        ),
-        triangles=_triangles(typed_entry(document, "triangles", list), len(names) + len(frame)),
+        template=_points_2d([point["template"] for point in points], "template"),
+        triangles=_triangles(document["triangles"], len(names) + len(frame)),
         landmark_weights=_landmark_weights(points),
-        rigid=_rigid(typed_entry(document, "rigid", list), names),
+        rigid=_rigid(document["rigid"], names),
         template_frame=frame,
     )
 
 
-def _indices(members: Any, names: tuple[str, ...], place: str) -> Int[Array, " s"]:
+def _indices(members: JsonValue, names: tuple[str, ...]) -> Int[Array, " s"]:
     """The points of these names."""
-    if not isinstance(members, list) or not members:
-        raise DocumentError(place, "expected a list of points")
-    for member in members:
+    if not isinstance(members.raw, list) or not members.raw:
+        raise members.error("expected a list of points")
+    for member in members.raw:
         if member not in names:
-            raise DocumentError(place, f"unknown point {str(member)[:40]!r}")
-    return frozen(np.array([names.index(member) for member in members]))
+            raise members.error(f"unknown point {str(member)[:40]!r}")
+    return frozen(np.array([names.index(member) for member in members.raw]))
 
 
-def _sets(levels: list[Any], names: tuple[str, ...]) -> list[dict[str, Int[Array, " s"]]]:
+def _sets(levels: list[JsonValue], names: tuple[str, ...]) -> list[dict[str, Int[Array, " s"]]]:
     """Levels of sets that hold every point; each set shares a point with the level above."""
     found = []
-    for number, level in enumerate(levels):
-        if not isinstance(level, dict):
-            raise DocumentError(f"sets[{number}]", "expected an object of lists of points")
-        found.append({k: _indices(v, names, f"sets[{number}].{k}") for k, v in level.items()})
+    for document in levels:
+        if not isinstance(document.raw, dict):
+            raise document.error("expected an object of lists of points")
+        found.append({name: _indices(named, names) for name, named in document.members().items()})
     for number, level in enumerate(found):
         for name, members in level.items():
             near = [s for other in found[max(number - 1, 0) : number] for s in other.values()]
@@ -167,23 +167,23 @@ def _sets(levels: list[Any], names: tuple[str, ...]) -> list[dict[str, Int[Array
     return found
 
 
-def _rigid(members: list[Any], names: tuple[str, ...]) -> Int[Array, " r"]:
-    indices = _indices(members, names, "rigid")
+def _rigid(members: JsonValue, names: tuple[str, ...]) -> Int[Array, " r"]:
+    indices = _indices(members, names)
     if len(indices) < 2:
         raise DocumentError("rigid", "expected at least 2 points")
     return indices
 
 
-def _points_2d(rows: list[Any], place: str) -> Float[Array, "n 2"]:
+def _points_2d(rows: list[JsonValue], place: str) -> Float[Array, "n 2"]:
     try:
-        return frozen(check_array(place, rows, (None, 2)))
+        return frozen(check_array(place, [row.raw for row in rows], (None, 2)))
     except InputError as error:
         raise DocumentError(place, f"expected {error.expected}, found {error.got}") from None
 
 
-def _mirror(points: list[Any], names: tuple[str, ...]) -> Int[Array, " n"]:
-    partners = [typed_entry(p, "mirror", str, p["name"]) for p in points]
-    mirror = _indices(partners, names, "mirror")
+def _mirror(points: list[JsonValue], names: tuple[str, ...]) -> Int[Array, " n"]:
+    partners = [point["mirror"].text() for point in points]
+    mirror = _indices(JsonValue(partners, "mirror"), names)
     for index, name in enumerate(names):
         if mirror[mirror[index]] != index:
             problem = f"its counterpart {partners[index]!r} has another one"
@@ -191,10 +191,11 @@ def _mirror(points: list[Any], names: tuple[str, ...]) -> Int[Array, " n"]:
     return mirror
 
 
-def _triangles(rows: list[Any], count: int) -> Int[Array, "t 3"]:
+def _triangles(value: JsonValue, count: int) -> Int[Array, "t 3"]:
+    rows = [item.raw for item in value.items()]
     triangles = np.array(rows) if all(_is_triple(row) for row in rows) else None
     if triangles is None or not len(rows) or triangles.min() < 0 or triangles.max() >= count:
-        raise DocumentError("triangles", f"expected triples of whole numbers from 0 to {count - 1}")
+        raise value.error(f"expected triples of whole numbers from 0 to {count - 1}")
     return frozen(triangles)
 
 
@@ -202,13 +203,10 @@ def _is_triple(row: Any) -> bool:
     return isinstance(row, list) and len(row) == 3 and all(type(entry) is int for entry in row)
 
 
-def _landmark_weights(points: list[Any]) -> Float[Array, "n 478"]:
+def _landmark_weights(points: list[JsonValue]) -> Float[Array, "n 478"]:
     weights = np.zeros((len(points), LANDMARK_COUNT))
     for row, point in zip(weights, points, strict=True):
-        place = f"{point['name']}.landmarks"
-        found = affine_weights(
-            typed_entry(point, "landmarks", dict, point["name"]), _landmark, place
-        )
+        found = affine_weights(point["landmarks"], _landmark)
         row[list(found)] = list(found.values())
     return frozen(weights)
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mien.arrays import Array, Bool, Float, Int, check_array, frozen
-from mien.assets.data_file import affine_weights, read_data, typed_entry
+from mien.assets.data_file import affine_weights, read_data
 from mien.assets.feature_points import FeatureLayout
 from mien.errors import DocumentError, InputError
-from mien.reading.strict_json import as_number
+from mien.reading.strict_json import JsonValue
 
 __all__ = ["SubregionDrawing", "Subregions", "default_subregions", "load_subregion_drawing"]
 
@@ -196,17 +195,17 @@ class _Region:
     also: Int[Array, " a"]
 
 
-def _drawing(document: dict[str, Any], layout: FeatureLayout) -> SubregionDrawing:
-    if typed_entry(document, "layout", str) != layout.name:
-        problem = f"expected {layout.name!r}, found {document['layout'][:40]!r}"
-        raise DocumentError("layout", problem)
-    blends = {k: _width(v, f"groups.{k}") for k, v in typed_entry(document, "groups", dict).items()}
+def _drawing(document: JsonValue, layout: FeatureLayout) -> SubregionDrawing:
+    stated = document["layout"]
+    if stated.text() != layout.name:
+        raise stated.error(f"expected {layout.name!r}, found {stated.raw[:40]!r}")
+    blends = {name: _width(width) for name, width in document["groups"].members().items()}
     regions: dict[str, _Region] = {}
-    for number, entry in enumerate(typed_entry(document, "regions", list)):
-        name = typed_entry(entry, "name", str, f"regions[{number}]")
+    for entry in document["regions"].items():
+        name = entry["name"].text()
         if name in regions:
-            raise DocumentError(f"regions[{number}]", f"{name!r} appears twice")
-        regions[name] = region = _region(entry, name, regions, layout)
+            raise entry.error(f"{name!r} appears twice")
+        regions[name] = region = _region(JsonValue(entry.raw, name), regions, layout)
         if region.group not in blends:
             raise DocumentError(f"{name}.group", f"unknown group {region.group[:40]!r}")
     if not regions:
@@ -220,54 +219,50 @@ def _drawing(document: dict[str, Any], layout: FeatureLayout) -> SubregionDrawin
     )
 
 
-def _region(
-    entry: dict[str, Any], name: str, before: dict[str, _Region], layout: FeatureLayout
-) -> _Region:
+def _region(entry: JsonValue, before: dict[str, _Region], layout: FeatureLayout) -> _Region:
     """A region as drawn, or an earlier one mirrored to the other side of the face."""
     if "mirror_of" not in entry:
-        also = _points(entry["also"], f"{name}.also", layout) if "also" in entry else []
-        group = typed_entry(entry, "group", str, name)
-        return _Region(group, _polygon(entry, name, layout), np.array(also, dtype=np.intp))
-    original = before.get(typed_entry(entry, "mirror_of", str, name))
+        also = _points(entry["also"], layout) if "also" in entry else []
+        group = entry["group"].text()
+        return _Region(group, _polygon(entry, layout), np.array(also, dtype=np.intp))
+    mirrored = entry["mirror_of"]
+    original = before.get(mirrored.text())
     if original is None:
-        raise DocumentError(
-            f"{name}.mirror_of", f"no subregion {entry['mirror_of']!r} before this one"
-        )
-    group = typed_entry(entry, "group", str, name) if "group" in entry else original.group
+        raise mirrored.error(f"no subregion {mirrored.raw!r} before this one")
+    group = entry.get("group", original.group).text()
     return _Region(group, _mirrored(original.corners, layout), layout.mirror[original.also])
 
 
-def _points(members: Any, place: str, layout: FeatureLayout) -> list[int]:
-    if not isinstance(members, list):
-        raise DocumentError(place, "expected a list of points")
-    for member in members:
+def _points(members: JsonValue, layout: FeatureLayout) -> list[int]:
+    if not isinstance(members.raw, list):
+        raise members.error("expected a list of points")
+    for member in members.raw:
         if member not in layout.names:
-            raise DocumentError(place, f"unknown point {str(member)[:40]!r}")
-    return [layout.index(member) for member in members]
+            raise members.error(f"unknown point {str(member)[:40]!r}")
+    return [layout.index(member) for member in members.raw]
 
 
-def _width(value: Any, place: str) -> float:
-    number = as_number(value, place)
+def _width(value: JsonValue) -> float:
+    number = value.number()
     if not 0 < number < 1:
-        raise DocumentError(place, f"expected a number between 0 and 1, found {number:g}")
+        raise value.error(f"expected a number between 0 and 1, found {number:g}")
     return number
 
 
-def _polygon(region: Any, name: str, layout: FeatureLayout) -> Float[Array, "c points"]:
+def _polygon(region: JsonValue, layout: FeatureLayout) -> Float[Array, "c points"]:
     frame = [f"frame.{i}" for i in range(len(layout.template_frame))]
     index = {point: i for i, point in enumerate((*layout.names, *frame))}
-    corners = typed_entry(region, "corners", list, name)
+    corners = region["corners"].items()
     polygon = np.zeros((len(corners), len(index)))
-    for number, (row, corner) in enumerate(zip(polygon, corners, strict=True)):
-        place = f"{name}.corners[{number}]"
-        if not isinstance(corner, dict):
-            raise DocumentError(place, "expected an object of shares by point")
-        found = affine_weights(corner, index.get, place)
+    for row, corner in zip(polygon, corners, strict=True):
+        if not isinstance(corner.raw, dict):
+            raise corner.error("expected an object of shares by point")
+        found = affine_weights(corner, index.get)
         row[list(found)] = list(found.values())
-    if region.get("symmetric"):
+    if region.get("symmetric", False).raw:
         polygon = np.vstack([polygon, _mirrored(polygon, layout)[::-1]])
     if len(polygon) < 3:
-        raise DocumentError(f"{name}.corners", f"expected at least 3, found {len(polygon)}")
+        raise region["corners"].error(f"expected at least 3, found {len(polygon)}")
     return polygon
 
 

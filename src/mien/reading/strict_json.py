@@ -6,11 +6,11 @@ import difflib
 import json
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +35,7 @@ def read_json(path: str | Path) -> dict[str, Any]:
 
 
 def parse_json(path: str | Path, text: str, *, line: int | None = None) -> Any:
-    """The value of a JSON text. NaN and infinity pass here; as_number refuses them.
+    """The value of a JSON text. NaN and infinity pass here; JsonValue.number refuses them.
 
     Args:
         path: the file, for messages.
@@ -86,16 +86,16 @@ class DocumentFormat:
         """The first entries of a document of this format."""
         return {"format": self.name, "version": self.version}
 
-    def check(self, data: Mapping[str, Any]) -> None:
+    def check(self, document: JsonValue) -> None:
         """Raises: DocumentError: another format than this one, or a newer version of it."""
-        if data.get("format") != self.name:
-            found = str(data.get("format"))[:40]
-            raise DocumentError("format", f"expected {self.name!r}, found {found!r}")
-        version = as_whole(data.get("version"), "version", above=0)
-        if version > self.version:
-            by = f" ({str(data['generator'])[:40]})" if "generator" in data else ""
+        stated = document.get("format", None)
+        if stated.raw != self.name:
+            raise stated.error(f"expected {self.name!r}, found {str(stated.raw)[:40]!r}")
+        version = document.get("version", None)
+        if version.whole(above=0) > self.version:
+            by = f" ({str(document['generator'].raw)[:40]})" if "generator" in document else ""
             limit = f"this one reads up to {self.version}"
-            raise DocumentError("version", f"{version} was written by a newer mien{by}; {limit}")
+            raise version.error(f"{version.raw} was written by a newer mien{by}; {limit}")
 
     def is_in(self, path: str | Path) -> bool:
         """Whether a file holds a document of this format, of whatever version."""
@@ -126,108 +126,119 @@ def errors_name_file(path: str | Path, line: int | None = None) -> Iterator[None
         raise FileFormatError(path, problem, f"{within}{error.name}") from None
 
 
-def as_object(value: object, place: str, keys: Iterable[str] | None = None) -> dict[str, Any]:
-    """An object with none but these keys. Raises: DocumentError: suggests the nearest keys."""
-    if not isinstance(value, dict):
-        raise_unexpected(place, "an object", value)
-    if keys is not None:
-        known = tuple(keys)
-        for key in value:
-            if key not in known:
-                raise DocumentError(join(place, key), unknown_name("key", key, known))
-    return value
+@dataclass(frozen=True)
+class JsonValue:
+    """A value in a JSON document; every error names its place.
 
+    Attributes:
+        raw: as json reads it.
+        place: in the document, as `expressions.joy.cameras[0]`; "" for the document itself.
+    """
 
-def as_list(value: object, place: str) -> list[Any]:
-    """A list. Raises: DocumentError."""
-    if not isinstance(value, list):
-        raise_unexpected(place, "a list", value)
-    return value
+    raw: Any
+    place: str = ""
 
+    def members(self, keys: Iterable[str] | None = None) -> dict[str, JsonValue]:
+        """Of an object with none but these keys. Raises: DocumentError: suggests the nearest."""
+        if not isinstance(self.raw, dict):
+            raise self.unexpected("an object")
+        if keys is not None:
+            known = tuple(keys)
+            for key in self.raw:
+                if key not in known:
+                    raise DocumentError(join(self.place, key), unknown_name("key", key, known))
+        return {key: JsonValue(value, join(self.place, key)) for key, value in self.raw.items()}
 
-def as_text(value: object, place: str) -> str:
-    """Text. Raises: DocumentError."""
-    if not isinstance(value, str):
-        raise_unexpected(place, "text", value)
-    return value
+    def items(self) -> list[JsonValue]:
+        """Of a list. Raises: DocumentError."""
+        if not isinstance(self.raw, list):
+            raise self.unexpected("a list")
+        return [JsonValue(item, f"{self.place}[{i}]") for i, item in enumerate(self.raw)]
 
+    def __contains__(self, key: str) -> bool:
+        if not isinstance(self.raw, dict):
+            raise self.unexpected("an object")
+        return key in self.raw
 
-def as_choice(value: object, place: str, kind: str, names: Collection[str]) -> str:
-    """One of these names. Raises: DocumentError: suggests the nearest ones."""
-    name = as_text(value, place)
-    if name not in names:
-        raise DocumentError(place, unknown_name(kind, name, names))
-    return name
+    def __getitem__(self, key: str) -> JsonValue:
+        """The member of this name. Raises: DocumentError: there is none."""
+        place = join(self.place, key)
+        if key not in self:
+            raise DocumentError(place, "missing")
+        return JsonValue(self.raw[key], place)
 
+    def get(self, key: str, default: object) -> JsonValue:
+        """The member of this name, or a default in its place. Raises: DocumentError."""
+        return self[key] if key in self else JsonValue(default, join(self.place, key))
 
-def as_number(
-    value: object,
-    place: str,
-    *,
-    above: float | None = None,
-    least: float = -LARGEST,
-    most: float = LARGEST,
-) -> float:
-    """A finite number above one limit or from the other on. Raises: DocumentError."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise_unexpected(place, "a number", value)
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise DocumentError(place, f"expected a finite number, found {number}")
-    if above is not None and not above < number <= most:
-        limits = f"above {above:g} and at most {most:g}"
-        raise DocumentError(place, f"expected a number {limits}, found {number:g}")
-    if not least <= number <= most:
-        raise DocumentError(
-            place, f"expected a number from {least:g} to {most:g}, found {number:g}"
-        )
-    return number
+    def text(self) -> str:
+        """Text. Raises: DocumentError."""
+        if not isinstance(self.raw, str):
+            raise self.unexpected("text")
+        return self.raw
 
+    def choice(self, kind: str, names: Collection[str]) -> str:
+        """One of these names. Raises: DocumentError: suggests the nearest ones."""
+        name = self.text()
+        if name not in names:
+            raise self.error(unknown_name(kind, name, names))
+        return name
 
-def as_whole(
-    value: object,
-    place: str,
-    *,
-    above: float | None = None,
-    least: float = -LARGEST,
-    most: float = LARGEST,
-) -> int:
-    """A whole number within these limits. Raises: DocumentError."""
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise_unexpected(place, "a whole number", value)
-    as_number(value, place, above=above, least=least, most=most)
-    return value
+    def number(
+        self, *, above: float | None = None, least: float = -LARGEST, most: float = LARGEST
+    ) -> float:
+        """A finite number above one limit or from the other on. Raises: DocumentError."""
+        if isinstance(self.raw, bool) or not isinstance(self.raw, int | float):
+            raise self.unexpected("a number")
+        try:
+            number = float(self.raw)
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
+            raise self.error(f"expected a finite number, found {number}")
+        if above is not None and not above < number <= most:
+            limits = f"above {above:g} and at most {most:g}"
+            raise self.error(f"expected a number {limits}, found {number:g}")
+        if not least <= number <= most:
+            raise self.error(f"expected a number from {least:g} to {most:g}, found {number:g}")
+        return number
 
+    def whole(
+        self, *, above: float | None = None, least: float = -LARGEST, most: float = LARGEST
+    ) -> int:
+        """A whole number within these limits. Raises: DocumentError."""
+        if isinstance(self.raw, bool) or not isinstance(self.raw, int):
+            raise self.unexpected("a whole number")
+        self.number(above=above, least=least, most=most)
+        return self.raw
 
-def as_array(value: object, place: str, shape: tuple[int, ...]) -> Array:
-    """Nested lists of finite numbers as an array of this shape. Raises: DocumentError."""
-    if not shape:
-        return np.array(as_number(value, place))
-    items = as_list(value, place)
-    if len(items) != shape[0]:
-        what = "numbers" if len(shape) == 1 else "lists"
-        raise DocumentError(place, f"expected {shape[0]} {what}, found {len(items)}")
-    rows = [as_array(item, f"{place}[{i}]", shape[1:]) for i, item in enumerate(items)]
-    return np.array(rows, dtype=np.float64).reshape(shape)
+    def array(self, *shape: int) -> Array:
+        """Nested lists of finite numbers as an array of this shape. Raises: DocumentError."""
+        if not shape:
+            return np.array(self.number())
+        items = self.items()
+        if len(items) != shape[0]:
+            what = "numbers" if len(shape) == 1 else "lists"
+            raise self.error(f"expected {shape[0]} {what}, found {len(items)}")
+        rows = [item.array(*shape[1:]) for item in items]
+        return np.array(rows, dtype=np.float64).reshape(shape)
 
+    def names(self) -> tuple[str, ...]:
+        """A list of texts, each once. Raises: DocumentError."""
+        names = tuple(item.text() for item in self.items())
+        for name, count in Counter(names).items():
+            if count > 1:
+                raise self.error(f"{name[:60]!r} appears twice")
+        return names
 
-def as_names(value: object, place: str) -> tuple[str, ...]:
-    """A list of texts, each once. Raises: DocumentError."""
-    names = tuple(as_text(name, f"{place}[{i}]") for i, name in enumerate(as_list(value, place)))
-    for name, count in Counter(names).items():
-        if count > 1:
-            raise DocumentError(place, f"{name[:60]!r} appears twice")
-    return names
+    def error(self, problem: str) -> DocumentError:
+        """That of this problem in this place."""
+        return DocumentError(self.place, problem)
 
-
-def need(data: Mapping[str, Any], key: str, place: str) -> Any:
-    """data[key]. Raises: DocumentError: there is none."""
-    if key not in data:
-        raise DocumentError(join(place, key), "missing")
-    return data[key]
+    def unexpected(self, expected: str) -> DocumentError:
+        """That of a value of another type; names the type that was found."""
+        shown = f" {str(self.raw)[:40]!r}" if isinstance(self.raw, str) else ""
+        return self.error(f"expected {expected}, found {json_type(self.raw)}{shown}")
 
 
 def join(place: str, key: str) -> str:
@@ -252,16 +263,6 @@ def json_type(value: object) -> str:
         return "null"
     names = {bool: "true or false", dict: "an object", list: "a list", str: "text"}
     return names.get(type(value), "a number")
-
-
-def raise_unexpected(place: str, expected: str, value: object) -> NoReturn:
-    """Refuse a value of another type.
-
-    Raises:
-        DocumentError: names the type that was found.
-    """
-    shown = f" {str(value)[:40]!r}" if isinstance(value, str) else ""
-    raise DocumentError(place, f"expected {expected}, found {json_type(value)}{shown}")
 
 
 class _RepeatedName(Exception):

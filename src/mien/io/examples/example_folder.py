@@ -20,7 +20,6 @@ from mien.io.examples.example_json import (
     STATISTICS,
     check_layout,
     examples_to_json,
-    index_of,
     photo_file,
     photo_from_json,
     points_from_json,
@@ -31,7 +30,7 @@ from mien.io.files.leftovers import finish_replacement
 from mien.numeric.kernels.threads import run_concurrently
 from mien.reading.names import check_path, is_inside
 from mien.reading.npz import ArrayFile
-from mien.reading.strict_json import as_list, as_object, as_text, errors_name_file, need, read_json
+from mien.reading.strict_json import JsonValue, errors_name_file, read_json
 from mien.synthesis.composition.example_warping import aligned_photos
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
@@ -141,14 +140,12 @@ def load_reasons(folder: str | Path) -> dict[str, str]:
     path, data = _read_index(Path(folder))
     reasons = {}
     with errors_name_file(path):
-        for index, entry in enumerate(as_list(need(data, "examples", ""), "examples")):
-            place = f"examples[{index}]"
-            name = as_text(need(as_object(entry, place), "name", place), f"{place}.name")
-            reasons[name] = as_text(entry.get("why", ""), f"{place}.why")
+        for entry in data["examples"].items():
+            reasons[entry["name"].text()] = entry.get("why", "").text()
     return reasons
 
 
-def _read_index(folder: Path) -> tuple[Path, dict[str, Any]]:
+def _read_index(folder: Path) -> tuple[Path, JsonValue]:
     path = folder / INDEX
     if not folder.is_dir():
         finish_replacement(folder)
@@ -157,52 +154,48 @@ def _read_index(folder: Path) -> tuple[Path, dict[str, Any]]:
         raise InputError(folder, "an example folder that `mien examples` made", found)
     if not path.exists():
         raise FileFormatError(path, "there is no such file; is this an example folder?")
-    data = read_json(path)
+    data = JsonValue(read_json(path))
     with errors_name_file(path):
         EXAMPLES_FORMAT.check(data)
     return path, data
 
 
-def _from_json(folder: Path, data: dict[str, Any], layout: FeatureLayout) -> ExampleSet:
-    check_layout(as_object(need(data, "layout", ""), "layout"), layout)
-    entries = as_list(need(data, "examples", ""), "examples")
+def _from_json(folder: Path, data: JsonValue, layout: FeatureLayout) -> ExampleSet:
+    check_layout(data["layout"], layout)
     # Most of the time goes into unpacking photos.
-    reading = [
-        partial(_example, folder, entry, f"examples[{i}]", layout)
-        for i, entry in enumerate(entries)
-    ]
+    reading = [partial(_example, folder, entry, layout) for entry in data["examples"].items()]
     examples = tuple(run_concurrently(*reading))
     if not examples:
         raise DocumentError("examples", "expected at least one, the neutral face; found none")
     names = [example.name for example in examples]
-    if need(data, "neutral", "") != names[0]:
-        problem = f"expected {names[0]!r}, the first example; found {str(data['neutral'])[:40]!r}"
-        raise DocumentError("neutral", problem)
-    teeth = as_list(need(data, "teeth", ""), "teeth")
-    standard = index_of(need(data, "standard", ""), "standard", names)
+    neutral = data["neutral"]
+    if neutral.raw != names[0]:
+        found = f"found {str(neutral.raw)[:40]!r}"
+        raise neutral.error(f"expected {names[0]!r}, the first example; {found}")
+    teeth = data["teeth"].items()
+    standard = names.index(data["standard"].choice("example", names))
     return ExampleSet(
         layout,
         examples,
         standard,
         _statistics(folder / STATISTICS, layout),
         _subregions(folder / SUBREGIONS, layout, examples[standard]),
-        tuple(index_of(name, f"teeth[{i}]", names) for i, name in enumerate(teeth)),
+        tuple(names.index(name.choice("example", names)) for name in teeth),
     )
 
 
-def _example(folder: Path, entry: object, place: str, layout: FeatureLayout) -> Example:
-    data = as_object(entry, place)
-    file = photo_from_json(data, place)
+def _example(folder: Path, data: JsonValue, layout: FeatureLayout) -> Example:
+    file = photo_from_json(data["photo"])
     photo = load_image(folder / PurePosixPath(file))
-    size = as_list(need(data, "size", place), f"{place}.size")
+    size = [item.raw for item in data["size"].items()]
     actual = [photo.shape[1], photo.shape[0]]
     if size != actual:
         raise FileFormatError(folder / file, f"expected {size} px, found {actual}")
     return Example(
-        as_text(need(data, "name", place), f"{place}.name"),
+        data["name"].text(),
         photo,
-        points_from_json(need(data, "points", place), f"{place}.points", layout, max(actual)),
-        as_text(need(data, "source", place), f"{place}.source"),
+        points_from_json(data["points"], layout, max(actual)),
+        data["source"].text(),
     )
 
 

@@ -9,18 +9,8 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.assets.feature_points import FeatureLayout
-from mien.errors import DocumentError
 from mien.reading.names import is_inside
-from mien.reading.strict_json import (
-    DocumentFormat,
-    as_list,
-    as_number,
-    as_object,
-    as_text,
-    join,
-    need,
-    unknown_name,
-)
+from mien.reading.strict_json import DocumentFormat, JsonValue
 from mien.synthesis.examples.example_set import Example, ExampleSet
 
 EXAMPLES_FORMAT = DocumentFormat("mien examples", 1)
@@ -63,58 +53,44 @@ def examples_to_json(example_set: ExampleSet, why: Mapping[str, str]) -> dict[st
     }
 
 
-def check_layout(data: dict[str, Any], layout: FeatureLayout) -> None:
+def check_layout(data: JsonValue, layout: FeatureLayout) -> None:
     """The points must be those of the layout, in its order: coefficients and statistics rely on it.
 
     Raises:
         DocumentError: other ones.
     """
-    name = as_text(need(data, "name", "layout"), "layout.name")
-    points = as_list(need(data, "points", "layout"), "layout.points")
-    if name == layout.name and points == list(layout.names):
+    name, points = data["name"].text(), data["points"]
+    if name == layout.name and points.raw == list(layout.names):
         return
     expected = f"the {len(layout.names)} points of {layout.name}"
-    found = f"{len(points)} of {name[:40]}" + ", other ones" * (name == layout.name)
-    raise DocumentError("layout", f"expected {expected}, found {found}: run `mien examples` again")
+    found = f"{len(points.items())} of {name[:40]}" + ", other ones" * (name == layout.name)
+    raise data.error(f"expected {expected}, found {found}: run `mien examples` again")
 
 
-def points_from_json(
-    value: object, place: str, layout: FeatureLayout, side: int
-) -> Float[Array, "n 2"]:
+def points_from_json(value: JsonValue, layout: FeatureLayout, side: int) -> Float[Array, "n 2"]:
     """(n, 2) px of points by name.
 
     Args:
         value: the points in the document.
-        place: where they are in it.
         layout: of the points.
         side: px, the photo's longer one; a point of a face that it cuts lies within one more.
 
     Raises:
         DocumentError: one is missing, unknown or no place.
     """
-    named = as_object(value, place, layout.names)
+    value.members(layout.names)
     points = np.empty((len(layout.names), 2))
     for index, name in enumerate(layout.names):
-        where = join(place, name)
-        pair = as_list(need(named, name, place), where)
+        pair = value[name].items()
         if len(pair) != 2:
-            raise DocumentError(where, f"expected [x, y] in px, found {len(pair)} numbers")
-        points[index] = [as_number(number, where, least=-side, most=2 * side) for number in pair]
+            raise value[name].error(f"expected [x, y] in px, found {len(pair)} numbers")
+        numbers = (JsonValue(item.raw, value[name].place) for item in pair)
+        points[index] = [number.number(least=-side, most=2 * side) for number in numbers]
     return points
 
 
-def index_of(name: object, place: str, names: list[str]) -> int:
-    """Index of the example of a name. Raises: DocumentError: none; suggests the nearest."""
-    if as_text(name, place) not in names:
-        raise DocumentError(place, unknown_name("example", str(name), names))
-    return names.index(str(name))
-
-
-def photo_from_json(data: Mapping[str, Any], place: str) -> str:
+def photo_from_json(data: JsonValue) -> str:
     """Path of an example's photo within the folder. Raises: DocumentError: one outside of it."""
-    file = as_text(need(data, "photo", place), f"{place}.photo")
-    if not is_inside(file):
-        raise DocumentError(
-            f"{place}.photo", f"expected a file within the folder, found {file[:60]!r}"
-        )
-    return file
+    if not is_inside(data.text()):
+        raise data.error(f"expected a file within the folder, found {data.raw[:60]!r}")
+    return data.text()

@@ -34,7 +34,7 @@ from mien.io.head.head_json import (
 from mien.io.head.region_masks import MASK_FILES, load_masks, save_masks
 from mien.limits import MAX_SIDE
 from mien.reading.names import check_path, is_inside
-from mien.reading.strict_json import as_names, as_object, as_text, join, need, read_json
+from mien.reading.strict_json import JsonValue, read_json
 
 HEAD, GEOMETRY = "head.json", "geometry.npz"
 
@@ -131,7 +131,7 @@ def load_head(folder: str | Path) -> Head:
     path = folder / HEAD
     if not path.exists():
         raise FileFormatError(path, "there is no such file; is this a head folder?")
-    data = read_json(path)
+    data = JsonValue(read_json(path))
     try:
         check_head_format(data)
         return _head_from(folder, data)
@@ -141,32 +141,27 @@ def load_head(folder: str | Path) -> Head:
         raise FileFormatError(path, f"{error} (or the other files do not fit it)") from None
 
 
-def _head_from(folder: Path, data: Json) -> Head:
-    expressions = as_object(need(data, "expressions", ""), "expressions")
-    described = {
-        name: (as_object(item, join("expressions", name)), join("expressions", name))
-        for name, item in expressions.items()
-    }
-    if NEUTRAL not in described:
-        raise DocumentError(f"expressions.{NEUTRAL}", "missing")
-    unit_names = as_names(need(data, "face_units", ""), "face_units")
-    part_names = as_names(need(data, "parts", ""), "parts")
+def _head_from(folder: Path, data: JsonValue) -> Head:
+    described = data["expressions"].members()
+    _ = data["expressions"][NEUTRAL]
+    unit_names = data["face_units"].names()
+    part_names = data["parts"].names()
     geometry = load_geometry(folder / GEOMETRY, tuple(described), part_names, len(unit_names))
     check_names(geometry.mesh, unit_names)
     shapes = {
         name: Expression(
             vertices=geometry.shapes[name],
-            views=views_from_json(item, place),
-            texture=as_text(need(item, "texture", place), f"{place}.texture"),
-            **units_and_gaze_from_json(item, place),
+            views=views_from_json(item["cameras"]),
+            texture=item["texture"].text(),
+            **units_and_gaze_from_json(item),
         )
-        for name, (item, place) in described.items()
+        for name, item in described.items()
     }
-    files = texture_paths(data)
+    files = texture_paths(data["textures"])
     textures = {name: load_image(folder / file) for name, file in files.items()}
     _check_textures(folder, files, textures, shapes)
     return Head(
-        subject=as_text(need(data, "subject", ""), "subject"),
+        subject=data["subject"].text(),
         mesh=geometry.mesh,
         expressions=shapes,
         uncertainty_mm=geometry.uncertainty_mm,
@@ -175,8 +170,8 @@ def _head_from(folder: Path, data: Json) -> Head:
         textures=textures,
         regions=load_masks(folder, geometry.mesh),
         shading=shading_from_json(data),
-        left_out=texts_from_json(data, "left_out"),
-        generator=as_text(need(data, "generator", ""), "generator"),
+        left_out=texts_from_json(data["left_out"]),
+        generator=data["generator"].text(),
     )
 
 

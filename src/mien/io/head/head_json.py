@@ -7,24 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from mien.arrays import Array
 from mien.camera import Camera
 from mien.errors import DocumentError, InputError
 from mien.head import SHADING, FittedView, Head
 from mien.limits import MAX_PHOTO_SIDE, UNIT_RANGE
 from mien.reading.names import is_inside
-from mien.reading.strict_json import (
-    DocumentFormat,
-    as_array,
-    as_choice,
-    as_list,
-    as_number,
-    as_object,
-    as_text,
-    as_whole,
-    join,
-    need,
-)
+from mien.reading.strict_json import DocumentFormat, JsonValue
 
 HEAD_FORMAT = DocumentFormat("mien head", 1)
 
@@ -73,78 +61,52 @@ def head_to_json(head: Head, photo_files: Mapping[str, str]) -> Json:
     }
 
 
-def check_head_format(data: Json) -> None:
+def check_head_format(data: JsonValue) -> None:
     """Raises: DocumentError: not a head's, from a newer version of mien, in other units."""
     HEAD_FORMAT.check(data)
-    units = as_object(need(data, "units", ""), "units")
     for name, expected in UNITS.items():
-        as_choice(need(units, name, "units"), f"units.{name}", name, (expected,))
+        data["units"][name].choice(name, (expected,))
 
 
-def texts_from_json(data: Json, key: str, place: str = "") -> dict[str, str]:
-    """data[key], an object whose values are text. Raises: DocumentError."""
-    texts = as_object(need(data, key, place), join(place, key))
-    return {name: as_text(text, join(join(place, key), name)) for name, text in texts.items()}
+def texts_from_json(data: JsonValue) -> dict[str, str]:
+    """An object whose values are text. Raises: DocumentError."""
+    return {name: text.text() for name, text in data.members().items()}
 
 
-def texture_paths(data: Json) -> dict[str, str]:
+def texture_paths(data: JsonValue) -> dict[str, str]:
     """Path of each texture within the folder. Raises: DocumentError: one outside of it."""
-    files = texts_from_json(data, "textures")
-    for name, path in files.items():
-        if not is_inside(path):
-            found = f"found {path[:60]!r}"
-            raise DocumentError(
-                join("textures", name), f"expected a path inside the folder, {found}"
-            )
-    return files
+    for path in data.members().values():
+        if not is_inside(path.text()):
+            raise path.error(f"expected a path inside the folder, found {path.raw[:60]!r}")
+    return texts_from_json(data)
 
 
-def views_from_json(data: Json, place: str) -> tuple[FittedView, ...]:
-    """The cameras of the expression at a place. Raises: DocumentError."""
-    place = f"{place}.cameras"
-    return tuple(
-        _view_from_json(as_object(item, f"{place}[{i}]"), f"{place}[{i}]")
-        for i, item in enumerate(as_list(need(data, "cameras", place[:-8]), place))
-    )
+def views_from_json(data: JsonValue) -> tuple[FittedView, ...]:
+    """The cameras of an expression. Raises: DocumentError."""
+    return tuple(_view_from_json(item) for item in data.items())
 
 
-def units_and_gaze_from_json(data: Json, place: str) -> Json:
+def units_and_gaze_from_json(data: JsonValue) -> dict[str, Any]:
     """Units and gaze of an expression, as fields of head.Expression. Raises: DocumentError.
 
     Heads of older versions of mien have none.
     """
-    units = as_object(data.get("units", {}), f"{place}.units")
     low, high = UNIT_RANGE
-    weights = {
-        name: as_number(weight, join(f"{place}.units", name), least=low, most=high)
-        for name, weight in units.items()
-    }
+    units = data.get("units", {}).members()
+    weights = {name: weight.number(least=low, most=high) for name, weight in units.items()}
     if "gaze_rad" not in data:
         return {"units": weights}
-    place = f"{place}.gaze_rad"
-    gaze = as_object(data["gaze_rad"], place)
-    eyes = [
-        (as_object(need(gaze, eye, place), join(place, eye)), join(place, eye)) for eye in _EYES
-    ]
-    angles = [
-        [
-            as_number(need(item, axis, at), join(at, axis), least=-np.pi, most=np.pi)
-            for axis in _AXES
-        ]
-        for item, at in eyes
-    ]
+    gaze = data["gaze_rad"]
+    angles = [[gaze[eye][axis].number(least=-np.pi, most=np.pi) for axis in _AXES] for eye in _EYES]
     return {"units": weights, "gaze": np.array(angles)}
 
 
-def shading_from_json(data: Json) -> dict[str, tuple[float, float, float]]:
+def shading_from_json(data: JsonValue) -> dict[str, tuple[float, float, float]]:
     """Coefficients by part, SHADING where there are none. Raises: DocumentError."""
     if "shading" not in data:
         return dict(SHADING)
-    shading = as_object(data["shading"], "shading", SHADING)
-    terms = {
-        part: as_array(need(shading, part, "shading"), f"shading.{part}", (3,)).tolist()
-        for part in SHADING
-    }
+    data["shading"].members(SHADING)
+    terms = {part: data["shading"][part].array(3).tolist() for part in SHADING}
     return {part: (c0, c1, c2) for part, (c0, c1, c2) in terms.items()}
 
 
@@ -165,30 +127,24 @@ def _view_to_json(view: FittedView) -> Json:
     }
 
 
-def _view_from_json(item: Json, place: str) -> FittedView:
-    def numbers(key: str, *shape: int) -> Array:
-        return as_array(need(item, key, place), f"{place}.{key}", shape)
-
-    def side(key: str) -> int:
-        return as_whole(need(item, key, place), f"{place}.{key}", above=0, most=MAX_PHOTO_SIDE)
-
+def _view_from_json(item: JsonValue) -> FittedView:
     try:
         camera = Camera(
-            width=side("width"),
-            height=side("height"),
-            focal_px=as_number(need(item, "focal_px", place), f"{place}.focal_px", above=0),
-            R_cam_head=numbers("R_cam_head", 3, 3),
-            t_cam_head=numbers("t_cam_head_mm", 3),
-            principal_px=numbers("principal_px", 2),
+            width=item["width"].whole(above=0, most=MAX_PHOTO_SIDE),
+            height=item["height"].whole(above=0, most=MAX_PHOTO_SIDE),
+            focal_px=item["focal_px"].number(above=0),
+            R_cam_head=item["R_cam_head"].array(3, 3),
+            t_cam_head=item["t_cam_head_mm"].array(3),
+            principal_px=item["principal_px"].array(2),
         )
         return FittedView(
-            photo=as_text(need(item, "photo", place), f"{place}.photo"),
+            photo=item["photo"].text(),
             camera=camera,
-            rms_px=as_number(need(item, "rms_px", place), f"{place}.rms_px", least=0),
-            points_used=as_whole(need(item, "points_used", place), f"{place}.points_used", least=0),
-            outliers=texts_from_json(item, "distrusted", place),
-            gains=numbers("gains", 3) if "gains" in item else np.ones(3),
+            rms_px=item["rms_px"].number(least=0),
+            points_used=item["points_used"].whole(least=0),
+            outliers=texts_from_json(item["distrusted"]),
+            gains=item.get("gains", [1.0, 1.0, 1.0]).array(3),
         )
     except InputError as error:
         problem = f"expected {error.expected}, found {error.got}"
-        raise DocumentError(f"{place}.{error.name}", problem) from None
+        raise DocumentError(f"{item.place}.{error.name}", problem) from None

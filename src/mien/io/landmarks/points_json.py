@@ -10,19 +10,9 @@ import numpy as np
 
 from mien.arrays import Array, Float, check_array
 from mien.assets.feature_points import FeatureLayout
-from mien.errors import DocumentError, InputError
+from mien.errors import InputError
 from mien.io.files.atomic import atomic_file
-from mien.reading.strict_json import (
-    as_list,
-    as_number,
-    as_object,
-    as_text,
-    errors_name_file,
-    join,
-    need,
-    read_json,
-    unknown_name,
-)
+from mien.reading.strict_json import JsonValue, errors_name_file, read_json, unknown_name
 
 __all__ = ["load_points_json", "save_points_json"]
 
@@ -44,9 +34,9 @@ def load_points_json(
         FileFormatError: not JSON, another layout's points, an unknown name (suggests the nearest),
             anything but so many finite numbers a point, no point at all; says where.
     """
-    data = read_json(path)
+    data = JsonValue(read_json(path))
     with errors_name_file(path):
-        return _points(as_object(data, "", _KEYS), layout, axes)
+        return _points(data, layout, axes)
 
 
 def save_points_json(
@@ -77,24 +67,22 @@ def save_points_json(
         temporary.write_text(text, encoding="utf-8")
 
 
-def _points(
-    data: Mapping[str, object], layout: FeatureLayout, axes: int
-) -> dict[str, Float[Array, " d"]]:
-    name = as_text(need(data, "layout", ""), "layout")
+def _points(data: JsonValue, layout: FeatureLayout, axes: int) -> dict[str, Float[Array, " d"]]:
+    data.members(_KEYS)
+    name = data["layout"].text()
     if name != layout.name:
-        raise DocumentError("layout", f"expected {layout.name!r}, found {name[:40]!r}")
-    rows = as_object(need(data, "points", ""), "points")
+        raise data["layout"].error(f"expected {layout.name!r}, found {name[:40]!r}")
+    rows = data["points"].members()
     if not rows:
-        raise DocumentError("points", "expected at least one point, found none")
+        raise data["points"].error("expected at least one point, found none")
     return {name: _point(name, row, layout, axes) for name, row in rows.items()}
 
 
-def _point(name: str, row: object, layout: FeatureLayout, axes: int) -> Float[Array, " d"]:
-    place = join("points", name)
+def _point(name: str, row: JsonValue, layout: FeatureLayout, axes: int) -> Float[Array, " d"]:
     if name not in layout.names:
-        raise DocumentError(place, unknown_name("point", name, layout.names))
-    numbers = as_list(row, place)
+        raise row.error(unknown_name("point", name, layout.names))
+    numbers = row.items()
     if len(numbers) != axes:
         expected = "x and y" if axes == 2 else "x, y and z"
-        raise DocumentError(place, f"expected {expected}, found {len(numbers)} numbers")
-    return np.array([as_number(number, place) for number in numbers])
+        raise row.error(f"expected {expected}, found {len(numbers)} numbers")
+    return np.array([JsonValue(number.raw, row.place).number() for number in numbers])

@@ -4,73 +4,60 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mien.animate.curves import INTERPOLATIONS, MIN_STEP, Curve, constant
 from mien.errors import DocumentError
-from mien.reading.strict_json import (
-    as_choice,
-    as_list,
-    as_number,
-    as_object,
-    need,
-    raise_unexpected,
-)
+from mien.reading.strict_json import JsonValue
 
 _KEY = ("time", "value", "interpolation", "in", "out")
 
 
-def curve_from_json(value: object, place: str) -> Curve:
+def curve_from_json(value: JsonValue) -> Curve:
     """The curve that a number, a list of keys or an object with keys stands for.
 
     Raises:
         DocumentError: none of these; names the place.
     """
-    if isinstance(value, int | float):
-        return constant(as_number(value, place))
-    if not isinstance(value, list | dict):
-        raise_unexpected(place, "a number, a list of keys or an object", value)
-    if isinstance(value, list):
-        value = {"keys": value}
-    data = as_object(value, place, ("interpolation", "keys"))
-    default = _interpolation(data, place, "cubic")
-    keys = as_list(need(data, "keys", place), f"{place}.keys")
+    if isinstance(value.raw, int | float):
+        return constant(value.number())
+    if not isinstance(value.raw, list | dict):
+        raise value.unexpected("a number, a list of keys or an object")
+    if isinstance(value.raw, list):
+        value = replace(value, raw={"keys": value.raw})
+    value.members(("interpolation", "keys"))
+    default = _interpolation(value, "cubic")
+    keys = value["keys"].items()
     if not keys:
-        raise DocumentError(f"{place}.keys", "expected at least one key, found none")
+        raise value["keys"].error("expected at least one key, found none")
     rows: list[tuple[float, float, str, float, float]] = []
-    for index, key in enumerate(keys):
-        where = f"{place}.keys[{index}]"
-        row = _key(key, where, default)
+    for key in keys:
+        row = _key(key, default)
         if rows and row[0] - rows[-1][0] < MIN_STEP:
             before = f"{rows[-1][0]:g} s of the key before"
-            raise DocumentError(
-                f"{where}.time", f"expected a time after the {before}, found {row[0]:g} s"
-            )
+            problem = f"expected a time after the {before}, found {row[0]:g} s"
+            raise DocumentError(f"{key.place}.time", problem)
         rows.append(row)
     times, values, kinds, *slopes = zip(*rows, strict=True)
     return Curve(np.array(times), np.array(values), kinds, np.array(slopes[0]), np.array(slopes[1]))
 
 
-def _key(key: object, place: str, default: str) -> tuple[float, float, str, float, float]:
-    if isinstance(key, list):
-        if len(key) != 2:
-            raise DocumentError(place, f"expected [time, value], found {len(key)} entries")
-        key = {"time": key[0], "value": key[1]}
-    data = as_object(key, place, _KEY)
-    return (
-        as_number(need(data, "time", place), f"{place}.time"),
-        as_number(need(data, "value", place), f"{place}.value"),
-        _interpolation(data, place, default),
-        as_number(data["in"], f"{place}.in") if "in" in data else math.nan,
-        as_number(data["out"], f"{place}.out") if "out" in data else math.nan,
-    )
+def _key(key: JsonValue, default: str) -> tuple[float, float, str, float, float]:
+    if isinstance(key.raw, list):
+        if len(key.raw) != 2:
+            raise key.error(f"expected [time, value], found {len(key.raw)} entries")
+        key = replace(key, raw=dict(zip(("time", "value"), key.raw, strict=True)))
+    key.members(_KEY)
+    time, value, kind = key["time"].number(), key["value"].number(), _interpolation(key, default)
+    before, after = (key[name].number() if name in key else math.nan for name in ("in", "out"))
+    return time, value, kind, before, after
 
 
-def _interpolation(data: dict[str, Any], place: str, default: str) -> str:
-    where = f"{place}.interpolation"
-    return as_choice(data.get("interpolation", default), where, "interpolation", INTERPOLATIONS)
+def _interpolation(data: JsonValue, default: str) -> str:
+    return data.get("interpolation", default).choice("interpolation", INTERPOLATIONS)
 
 
 def curve_to_json(curve: Curve) -> Any:

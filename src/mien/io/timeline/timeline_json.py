@@ -5,12 +5,10 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from mien.animate.channels import (
     ANGLES,
@@ -24,23 +22,12 @@ from mien.animate.channels import (
 from mien.animate.curves import Curve
 from mien.animate.layers import GENERATORS, Generator
 from mien.animate.timeline import PIVOT_MM, Clip, Layer, Placement, Timeline, Tracks
+from mien.arrays import Array, Float
 from mien.errors import DocumentError, InputError
 from mien.io.files.atomic import atomic_file
 from mien.io.timeline.timeline_curves import curve_from_json, curve_to_json, rounded
 from mien.limits import MAX_FPS, MAX_SECONDS, MAX_SIDE, MIN_FPS
-from mien.reading.strict_json import (
-    DocumentFormat,
-    as_choice,
-    as_list,
-    as_number,
-    as_object,
-    as_text,
-    as_whole,
-    errors_name_file,
-    join,
-    need,
-    read_json,
-)
+from mien.reading.strict_json import DocumentFormat, JsonValue, errors_name_file, read_json
 
 TIMELINE_FORMAT = DocumentFormat("mien timeline", 1)
 
@@ -63,7 +50,7 @@ def load_timeline_json(path: str | Path) -> Timeline:
             name (the nearest one is suggested), a value of another type, NaN, a time that does not
             rise, a duration or rate out of range, a clip that contains itself, a newer version.
     """
-    data = read_json(path)
+    data = JsonValue(read_json(path))
     with errors_name_file(path):
         return timeline_from_json(data)
 
@@ -82,113 +69,99 @@ def save_timeline(path: str | Path, timeline: Timeline) -> None:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def timeline_from_json(data: Mapping[str, Any]) -> Timeline:
+def timeline_from_json(data: JsonValue) -> Timeline:
     """The performance that a document's contents describe. Raises: DocumentError; InputError."""
     TIMELINE_FORMAT.check(data)
-    top = as_object(data, "", _TOP)
-    clips = as_object(top.get("clips", {}), "clips")
+    data.members(_TOP)
+    clips = data.get("clips", {}).members()
     return Timeline(
-        duration=_duration(top, ""),
-        fps=as_number(top.get("fps", 30), "fps", least=MIN_FPS, most=MAX_FPS),
-        size=_size(top["size"]) if "size" in top else None,
-        pivot=np.array(_numbers(top.get("pivot", list(PIVOT_MM)), "pivot", 3)),
-        tracks=_tracks(top, ""),
-        placements=_placements(top, "", clips),
-        clips={name: _clip(clip, f"clips.{name}", clips) for name, clip in clips.items()},
-        layers=tuple(
-            _layer(layer, f"layers[{index}]", clips)
-            for index, layer in enumerate(as_list(top.get("layers", []), "layers"))
-        ),
+        duration=_duration(data),
+        fps=data.get("fps", 30).number(least=MIN_FPS, most=MAX_FPS),
+        size=_size(data["size"]) if "size" in data else None,
+        pivot=_pivot(data.get("pivot", list(PIVOT_MM))),
+        tracks=_tracks(data),
+        placements=_placements(data, clips),
+        clips={name: _clip(clip, clips) for name, clip in clips.items()},
+        layers=tuple(_layer(layer, clips) for layer in data.get("layers", []).items()),
     )
 
 
-def _duration(data: dict[str, Any], place: str) -> float:
-    value = need(data, "duration", place)
-    return as_number(value, join(place, "duration"), above=0, most=MAX_SECONDS)
+def _duration(data: JsonValue) -> float:
+    return data["duration"].number(above=0, most=MAX_SECONDS)
 
 
-def _size(value: object) -> tuple[int, int]:
-    items = as_list(value, "size")
+def _size(value: JsonValue) -> tuple[int, int]:
+    items = value.items()
     if len(items) != 2:
-        raise DocumentError("size", f"expected [width, height], found {len(items)} entries")
-    width, height = (
-        as_whole(item, f"size[{i}]", above=0, most=MAX_SIDE) for i, item in enumerate(items)
-    )
+        raise value.error(f"expected [width, height], found {len(items)} entries")
+    width, height = (item.whole(above=0, most=MAX_SIDE) for item in items)
     return width, height
 
 
-def _numbers(value: object, place: str, count: int) -> list[float]:
-    items = as_list(value, place)
-    if len(items) != count:
-        raise DocumentError(place, f"expected {count} numbers, found {len(items)} entries")
-    return [as_number(item, f"{place}[{i}]") for i, item in enumerate(items)]
+def _pivot(value: JsonValue) -> Float[Array, " 3"]:
+    items = value.items()
+    if len(items) != 3:
+        raise value.error(f"expected 3 numbers, found {len(items)} entries")
+    return value.array(3)
 
 
-def _tracks(data: dict[str, Any], above: str) -> dict[str, Curve]:
-    place = join(above, "tracks")
+def _tracks(data: JsonValue) -> dict[str, Curve]:
     tracks = {}
     groups = (HEAD, GAZE, UNITS, *REGION_NAMES)
-    for group, members in as_object(data.get("tracks", {}), place, groups).items():
-        inside = as_object(members, f"{place}.{group}", CHANNEL_NAMES.get(group))
-        for name, track in inside.items():
-            curve = curve_from_json(track, join(f"{place}.{group}", name))
-            channel = f"{group}.{name}"
+    for group, members in data.get("tracks", {}).members(groups).items():
+        for name, track in members.members(CHANNEL_NAMES.get(group)).items():
+            curve, channel = curve_from_json(track), f"{group}.{name}"
             tracks[channel] = curve.scaled(math.pi / 180) if channel in ANGLES else curve
     return tracks
 
 
-def _placements(data: dict[str, Any], above: str, clips: Collection[str]) -> tuple[Placement, ...]:
-    place = join(above, "play")
-    return tuple(
-        _placement(item, f"{place}[{index}]", clips)
-        for index, item in enumerate(as_list(data.get("play", []), place))
-    )
+def _placements(data: JsonValue, clips: Collection[str]) -> tuple[Placement, ...]:
+    return tuple(_placement(item, clips) for item in data.get("play", []).items())
 
 
-def _placement(value: object, place: str, clips: Collection[str]) -> Placement:
-    data = as_object(value, place, _PLACEMENT)
+def _placement(data: JsonValue, clips: Collection[str]) -> Placement:
+    data.members(_PLACEMENT)
     return Placement(
-        clip=as_choice(need(data, "clip", place), f"{place}.clip", "clip", clips),
-        at=as_number(need(data, "at", place), f"{place}.at"),
-        speed=as_number(data.get("speed", 1), f"{place}.speed", above=0),
-        weight=as_number(data.get("weight", 1), f"{place}.weight"),
-        repeats=as_number(data.get("repeats", 1), f"{place}.repeats", above=0),
+        clip=data["clip"].choice("clip", clips),
+        at=data["at"].number(),
+        speed=data.get("speed", 1).number(above=0),
+        weight=data.get("weight", 1).number(),
+        repeats=data.get("repeats", 1).number(above=0),
     )
 
 
-def _clip(value: object, place: str, clips: Collection[str]) -> Clip:
-    data = as_object(value, place, ("duration", *_MOTION))
-    return Clip(_duration(data, place), _tracks(data, place), _placements(data, place, clips))
+def _clip(data: JsonValue, clips: Collection[str]) -> Clip:
+    data.members(("duration", *_MOTION))
+    return Clip(_duration(data), _tracks(data), _placements(data, clips))
 
 
-def _layer(value: object, place: str, clips: Collection[str]) -> Layer:
-    data = as_object(value, place)
+def _layer(data: JsonValue, clips: Collection[str]) -> Layer:
+    members = data.members()
     generator = None
     parameters: tuple[str, ...] = ()
-    if "generator" in data:
-        kind = as_choice(data["generator"], f"{place}.generator", "generator", GENERATORS)
+    if "generator" in members:
+        kind = data["generator"].choice("generator", GENERATORS)
         parameters = tuple(item.name for item in fields(GENERATORS[kind]))
-    as_object(data, place, ("name", "weight", "generator", *_MOTION, *parameters))
+    data.members(("name", "weight", "generator", *_MOTION, *parameters))
     if parameters:
-        generator = _generator(kind, {k: data[k] for k in parameters if k in data}, place)
+        given = {name: members[name] for name in parameters if name in members}
+        generator = _generator(kind, given, data.place)
     return Layer(
-        name=as_text(data.get("name", ""), f"{place}.name"),
-        weight=curve_from_json(data.get("weight", 1), f"{place}.weight"),
-        tracks=_tracks(data, place),
-        placements=_placements(data, place, clips),
+        name=data.get("name", "").text(),
+        weight=curve_from_json(data.get("weight", 1)),
+        tracks=_tracks(data),
+        placements=_placements(data, clips),
         generator=generator,
     )
 
 
-def _generator(kind: str, given: dict[str, Any], place: str) -> Generator:
+def _generator(kind: str, given: dict[str, JsonValue], place: str) -> Generator:
     values: dict[str, Any] = {}
     for name, value in given.items():
-        where = f"{place}.{name}"
         if name == "seed":
-            values[name] = as_whole(value, where, above=-1)
+            values[name] = value.whole(above=-1)
         else:
-            factor = math.pi / 180 if name in DEGREES else 1.0
-            values[name] = as_number(value, where) * factor
+            values[name] = value.number() * (math.pi / 180 if name in DEGREES else 1.0)
     try:
         return GENERATORS[kind](**values)
     except InputError as error:

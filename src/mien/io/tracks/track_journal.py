@@ -18,20 +18,15 @@ from typing import Any, BinaryIO, TextIO, cast
 import numpy as np
 
 from mien.arrays import Array, Float
-from mien.errors import DocumentError, FileFormatError, InputError
+from mien.errors import FileFormatError, InputError
 from mien.io.files.atomic import atomic_file
 from mien.limits import MAX_LINE, MAX_TABLE_BYTES
 from mien.reading.files import check_size
 from mien.reading.strict_json import (
     DocumentFormat,
-    as_choice,
-    as_list,
-    as_number,
-    as_object,
-    as_whole,
+    JsonValue,
     errors_name_file,
     join,
-    need,
     parse_json,
 )
 from mien.track.state import STATUSES, Layout, Status, TrackedFrame, TrackState
@@ -153,7 +148,7 @@ def load_journal(
             for number, line in enumerate(lines, 2):
                 data = _parsed(path, number, line, "a frame of a track")
                 with errors_name_file(path, line=number):
-                    frames.append(_frame(data, layout, frames))
+                    frames.append(_frame(JsonValue(data), layout, frames))
     except OSError as error:
         raise InputError(path, "a readable file", error.strerror or error) from None
     return tuple(frames)
@@ -184,7 +179,7 @@ def _parsed(path: Path, number: int, line: bytes, expected: str) -> Json:
 def _check_header(path: Path, line: bytes, run: Json) -> None:
     top = _parsed(path, 1, line or b"null", "the journal of an unfinished track")
     with errors_name_file(path, line=1):
-        JOURNAL_FORMAT.check(top)
+        JOURNAL_FORMAT.check(JsonValue(top))
     for place, kept, wanted in _differences(top.get("run"), run):
         raise InputError(path, f"an unfinished run with {place} = {wanted}", f"one with {kept}")
 
@@ -228,48 +223,45 @@ def _numbers(array: Array) -> list[float]:
     return np.asarray(array, dtype=np.float64).ravel().tolist()
 
 
-def _frame(data: Json, layout: Layout, before: Sequence[TrackedFrame]) -> TrackedFrame:
+def _frame(data: JsonValue, layout: Layout, before: Sequence[TrackedFrame]) -> TrackedFrame:
     """The frame that follows those before it. Raises: DocumentError, InputError."""
-    as_object(data, "", _FRAME)
-    index = as_whole(need(data, "frame", ""), "frame", least=0)
+    data.members(_FRAME)
+    index = data["frame"].whole(least=0)
     if index != len(before):
-        raise DocumentError("frame", f"expected {len(before)}, found {index}")
-    seconds = as_number(need(data, "time", ""), "time")
+        raise data["frame"].error(f"expected {len(before)}, found {index}")
+    seconds = data["time"].number()
     if before and seconds < (earliest := before[-1].time):
-        raise DocumentError("time", f"expected {earliest:g} s or later, found {seconds:g} s")
-    status = as_choice(need(data, "status", ""), "status", "status", STATUSES)
-    state = need(data, "state", "")
-    if (state is None) != (status == "lost"):
-        expected = "none" if state else "one"
-        raise DocumentError("state", f"expected {expected} of a frame that is {status}")
-    found, channels = state is not None, len(layout.channels)
-    gain, bias = (_floats(need(data, key, ""), key, 3, finite=found) for key in ("gain", "bias"))
-    rms, seen = _floats([need(data, "rms", ""), need(data, "seen", "")], "rms", 2, finite=found)
+        raise data["time"].error(f"expected {earliest:g} s or later, found {seconds:g} s")
+    status, state = data["status"].choice("status", STATUSES), data["state"]
+    found, channels = state.raw is not None, len(layout.channels)
+    if found == (status == "lost"):
+        expected = "none" if state.raw else "one"
+        raise state.error(f"expected {expected} of a frame that is {status}")
+    gain, bias = (_floats(data[key], 3, finite=found) for key in ("gain", "bias"))
+    pair = JsonValue([data["rms"].raw, data["seen"].raw], "rms")
+    rms, seen = _floats(pair, 2, finite=found)
     return TrackedFrame(
         frame=index,
         time=seconds,
         status=cast(Status, status),
-        state=_state_from_json(as_object(state, "state"), layout) if found else None,
+        state=_state_from_json(state, layout) if found else None,
         rms=float(rms),
         seen=float(seen),
-        deviations=_floats(need(data, "deviations", ""), "deviations", channels, finite=False),
+        deviations=_floats(data["deviations"], channels, finite=False),
         gain=gain,
         bias=bias,
     )
 
 
-def _state_from_json(data: Json, layout: Layout) -> TrackState:
-    as_object(data, "state", _STATE)
+def _state_from_json(data: JsonValue, layout: Layout) -> TrackState:
+    data.members(_STATE)
     shape = (len(layout.regions), len(layout.expressions))
-    if need(data, "weights_shape", "state") != list(shape):
-        found = str(data["weights_shape"])[:40]
-        raise DocumentError("state.weights_shape", f"expected {list(shape)}, found {found}")
+    stated = data["weights_shape"]
+    if stated.raw != list(shape):
+        raise stated.error(f"expected {list(shape)}, found {str(stated.raw)[:40]}")
     counts = {"R_cam_head": 9, "t_cam_head": 3, "weights": shape[0] * shape[1]}
     counts |= {"units": len(layout.units), "gaze": 2}
-    arrays = {
-        name: _floats(need(data, name, "state"), f"state.{name}", count, finite=True)
-        for name, count in counts.items()
-    }
+    arrays = {name: _floats(data[name], count, finite=True) for name, count in counts.items()}
     arrays |= {
         "R_cam_head": arrays["R_cam_head"].reshape(3, 3),
         "weights": arrays["weights"].reshape(shape),
@@ -277,15 +269,15 @@ def _state_from_json(data: Json, layout: Layout) -> TrackState:
     return TrackState(**arrays)
 
 
-def _floats(value: object, place: str, count: int, *, finite: bool) -> Float[Array, " n"]:
+def _floats(value: JsonValue, count: int, *, finite: bool) -> Float[Array, " n"]:
     """(count,) numbers; NaN among them unless they must be finite. Raises: DocumentError."""
-    items = as_list(value, place)
+    items = value.items()
     if len(items) != count:
-        raise DocumentError(place, f"expected {count} numbers, found {len(items)}")
-    for index, item in enumerate(items):
-        if finite or item == item:
-            as_number(item, f"{place}[{index}]")
-    return np.array(items, dtype=np.float64)
+        raise value.error(f"expected {count} numbers, found {len(items)}")
+    for item in items:
+        if finite or item.raw == item.raw:
+            item.number()
+    return np.array(value.raw, dtype=np.float64)
 
 
 @contextmanager

@@ -8,15 +8,7 @@ from pathlib import Path
 
 from mien.errors import InputError
 from mien.limits import MAX_FPS, MAX_PHOTO_SIDE, MIN_FPS
-from mien.reading.strict_json import (
-    DocumentFormat,
-    as_names,
-    as_number,
-    as_whole,
-    errors_name_file,
-    need,
-    read_json,
-)
+from mien.reading.strict_json import DocumentFormat, JsonValue, errors_name_file, read_json
 from mien.track.state import Layout, Track
 
 TRACK_FORMAT = DocumentFormat("mien track", 1)
@@ -69,15 +61,13 @@ def load_sidecar(path: Path) -> Track:
     if not path.exists():
         expected = "the file that goes with the .csv and says what its numbers mean"
         raise InputError(path, expected, "no such file")
-    data = read_json(path)
+    data = JsonValue(read_json(path))
     with errors_name_file(path):
         TRACK_FORMAT.check(data)
         width, height = (
-            as_whole(need(data, key, ""), key, above=0, most=MAX_PHOTO_SIDE)
-            for key in ("width", "height")
+            data[key].whole(above=0, most=MAX_PHOTO_SIDE) for key in ("width", "height")
         )
-        focal_px = as_number(need(data, "focal_px", ""), "focal_px", above=0)
-        fps = as_number(need(data, "fps", ""), "fps", least=MIN_FPS, most=MAX_FPS)
-        names = (as_names(need(data, key, ""), key) for key in ("regions", "expressions", "units"))
-        layout = Layout(*names)
+        focal_px = data["focal_px"].number(above=0)
+        fps = data["fps"].number(least=MIN_FPS, most=MAX_FPS)
+        layout = Layout(*(data[key].names() for key in ("regions", "expressions", "units")))
     return Track(layout, width, height, focal_px, fps, ())
