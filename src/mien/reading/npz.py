@@ -11,7 +11,6 @@ import zipfile
 import zlib
 from pathlib import Path
 from tokenize import TokenError
-from types import TracebackType
 from typing import IO, Self
 
 import numpy as np
@@ -80,12 +79,7 @@ class ArrayFile:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         self._archive.close()
 
     def numbers(self, name: str, shape: Shape, *, most: float = LARGEST) -> Float[Array, ...]:
