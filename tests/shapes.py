@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mien.arrays import Array
 from mien.camera import Camera
 from mien.mesh import Mesh
 from mien.render.orbit import orbit_camera
+from mien.texture.cylinder import Cylinder
 
 RADII = np.array([75.0, 110.0, 95.0])
 
@@ -59,3 +62,15 @@ def camera_at(yaw_deg: float, mesh: Mesh, *, size: int = 320, pitch_deg: float =
     """A camera that sees the whole mesh from this side."""
     yaw, pitch = np.radians([yaw_deg, pitch_deg])
     return orbit_camera(yaw, pitch, width=size, height=size, vertices=mesh.vertices)
+
+
+def with_cylinder_uvs(mesh: Mesh, cylinder: Cylinder) -> Mesh:
+    """The mesh with the cylinder's texture coordinates, one to each corner of a triangle.
+
+    Triangles across the seam get u beyond 1; texture lookups go around.
+    """
+    corners = cylinder.uvs(mesh.vertices)[mesh.triangles]
+    u = corners[..., 0]
+    corners[..., 0] = np.where(u - u.max(axis=1, keepdims=True) < -0.5, u + 1, u)
+    indices = np.arange(corners.size // 2, dtype=np.int32).reshape(-1, 3)
+    return replace(mesh, uvs=corners.reshape(-1, 2), uv_triangles=indices)

@@ -5,8 +5,8 @@ import pytest
 
 from mien.errors import InputError
 from mien.mesh import Mesh
-from mien.texture.cylinder import Cylinder, cylinder_surface, fit_cylinder, with_cylinder_uvs
-from shapes import RADII, ellipsoid, with_nose
+from mien.texture.cylinder import Cylinder, cylinder_surface, fit_cylinder
+from shapes import RADII, ellipsoid, with_cylinder_uvs, with_nose
 
 
 def test_the_cylinder_stands_around_the_middle_of_the_head() -> None:

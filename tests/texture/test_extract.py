@@ -10,10 +10,10 @@ from mien.errors import EstimationError, InputError
 from mien.mesh import Mesh
 from mien.render.shade import render
 from mien.texture.atlas import atlas_surface
-from mien.texture.cylinder import cylinder_surface, fit_cylinder, with_cylinder_uvs
+from mien.texture.cylinder import cylinder_surface, fit_cylinder
 from mien.texture.extract import extract_texture
 from mien.texture.parts import STYLES
-from shapes import camera_at, ellipsoid, smooth_texture, with_nose
+from shapes import camera_at, ellipsoid, smooth_texture, with_cylinder_uvs, with_nose
 
 YAWS = (-50, 0, 50)
 

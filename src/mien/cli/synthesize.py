@@ -122,15 +122,7 @@ def synthesize(
             progress=progress,
         )
     height, width = result.synthesis.image.shape[:2]
-    data = {
-        "output": str(output),
-        "width": width,
-        "height": height,
-        "weights": None if weights is None else str(weights),
-        "hull_px": {name: round(px, 3) for name, px in result.hull_px.items()},
-        "notes": list(result.notes),
-    }
-    print_result(json_, data, f"{output}: {width}x{height}", result.notes)
+    _print(json_, output, weights, (width, height), {"hull_px": result.hull_px}, result.notes)
 
 
 def _synthesize_head(
@@ -161,16 +153,27 @@ def _synthesize_head(
             view=_view(**{name.removeprefix("--"): value for name, value in view.items()}),
             progress=progress,
         )
-    width, height = result.size
+    _print(json_, output, weights, result.size, {"hull_mm": result.hull_mm}, result.notes)
+
+
+def _print(
+    json_: bool,
+    output: Path,
+    weights: Path | None,
+    size: tuple[int, int],
+    hull: dict[str, dict[str, float]],
+    notes: tuple[str, ...],
+) -> None:
+    width, height = size
     data = {
         "output": str(output),
         "width": width,
         "height": height,
         "weights": None if weights is None else str(weights),
-        "hull_mm": {name: round(mm, 3) for name, mm in result.hull_mm.items()},
-        "notes": list(result.notes),
+        **{key: {name: round(off, 3) for name, off in by.items()} for key, by in hull.items()},
+        "notes": list(notes),
     }
-    print_result(json_, data, f"{output}: {width}x{height}", result.notes)
+    print_result(json_, data, f"{output}: {width}x{height}", notes)
 
 
 def _view(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mien.arrays import Array, Float, Int, UInt8, check_array, check_image
+from mien.arrays import Array, Int, UInt8, check_image
 from mien.camera import Camera
 from mien.errors import InputError
 from mien.mesh import Mesh
@@ -50,25 +50,6 @@ def overlay_mesh(
         drawn = photo.copy()
     cv2.polylines(drawn, list(_fixed_point(ends)), False, colour, 1, cv2.LINE_AA, _SHIFT)
     return cv2.addWeighted(drawn, opacity, photo, 1 - opacity, 0)
-
-
-def draw_points(
-    image: UInt8[Array, "h w 3"],
-    points: Float[Array, "n 2"],
-    *,
-    colour: tuple[int, int, int] = (255, 210, 60),
-    radius: float = 3.0,
-) -> UInt8[Array, "h w 3"]:
-    """The image with a dot at every point, (N, 2) px; points that are not finite are left out."""
-    import cv2
-
-    points = check_array("points", points, (None, 2), finite=False)
-    drawn = check_image("image", image).copy()
-    near = np.isfinite(points).all(axis=1) & (np.abs(points) < 1e5).all(axis=1)
-    for x, y in _fixed_point(points[near]):
-        size = round(radius * 2**_SHIFT)
-        cv2.circle(drawn, (int(x), int(y)), size, colour, -1, cv2.LINE_AA, _SHIFT)
-    return drawn
 
 
 def _visible_edges(mesh: Mesh, camera: Camera) -> Int[Array, "e 2"]:

@@ -7,7 +7,7 @@ v runs upwards from the lowest to the highest point.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -102,18 +102,6 @@ def cylinder_surface(
     for_row_bands(rows, height, work=width * height)
     ids = np.append(chosen, -1).astype(np.int32)[ids]
     return surface_from(mesh, ids, barycentrics, wrap=True)
-
-
-def with_cylinder_uvs(mesh: Mesh, cylinder: Cylinder) -> Mesh:
-    """The mesh with the cylinder's texture coordinates, one to each corner of a triangle.
-
-    Triangles across the seam get u beyond 1; texture lookups go around.
-    """
-    corners = cylinder.uvs(mesh.vertices)[mesh.triangles]
-    u = corners[..., 0]
-    corners[..., 0] = np.where(u - u.max(axis=1, keepdims=True) < -0.5, u + 1, u)
-    indices = np.arange(corners.size // 2, dtype=np.int32).reshape(-1, 3)
-    return replace(mesh, uvs=corners.reshape(-1, 2), uv_triangles=indices)
 
 
 @njit(cache=True, nogil=True)
