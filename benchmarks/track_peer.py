@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from mien.arrays import Array, Float, UInt8
-from mien.assets.detector import detector_model_path
+from mien.assets.networks import detector_model_path
 
 __all__ = ["PeerFace", "VideoLandmarker", "peer_faces"]
 

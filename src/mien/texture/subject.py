@@ -6,6 +6,7 @@ import numpy as np
 
 from mien.arrays import Array, Bool, UInt8, check_image
 from mien.camera import Camera
+from mien.capture.person_mask import find_person
 from mien.mesh import Mesh
 from mien.numeric.raster.rasterizer import rasterize
 
@@ -13,6 +14,10 @@ from mien.numeric.raster.rasterizer import rasterize
 _SIDE = 240
 # Space around the mesh that is segmented with it, as a share of its size.
 _BORDER = 0.2
+# The square in which a person is looked for, over the mesh's larger side.
+_SQUARE = 1.35
+# Of the mesh's inner pixels: where the network takes so few for a person, it knows nothing.
+_RECOGNIZED = 0.8
 # Width of the strip on both sides of the mesh's outline in which the cut may run, as a share of
 # the head's size in the photo.
 _STRIP = 0.06
@@ -23,9 +28,11 @@ def subject_mask(
 ) -> Bool[Array, "h w"]:
     """Pixels that show the person rather than the background, around the mesh.
 
-    A graph cut on colours, initialized with the projected mesh: pixels well inside its outline are
-    foreground, pixels well outside are background, and the cut decides in the strip between. Where
-    the colours on both sides are alike (dark hair before a dark wall), the mesh's outline is kept.
+    A network says where the person is (capture.person_mask). What it does not take for one, a
+    drawing perhaps, is cut out by its colours, initialized with the projected mesh: pixels well
+    inside its outline are foreground, pixels well outside are background, and the cut decides in
+    the strip between. Where the colours on both sides are alike (dark hair before a dark wall), the
+    mesh's outline is kept.
 
     Args:
         mesh: of the head, without parts that one can see through.
@@ -41,6 +48,9 @@ def subject_mask(
     if outline is None:
         return np.zeros(photo.shape[:2], bool)
     left, top, right, bottom = outline
+    found = _recognized(mesh, camera, photo, outline)
+    if found is not None:
+        return found
     scale = min(1.0, _SIDE / max(right - left, bottom - top))
     size = (max(1, round((right - left) * scale)), max(1, round((bottom - top) * scale)))
     small = cv2.resize(photo[top:bottom, left:right], size, interpolation=cv2.INTER_AREA)
@@ -55,6 +65,21 @@ def subject_mask(
     full = cv2.resize(mask, (right - left, bottom - top), interpolation=cv2.INTER_LINEAR)
     person[top:bottom, left:right] = full > 0.5
     return person
+
+
+def _recognized(
+    mesh: Mesh, camera: Camera, photo: Array, outline: tuple[int, int, int, int]
+) -> Bool[Array, "h w"] | None:
+    """What the network takes for a person; None where that has little to do with the mesh."""
+    left, top, right, bottom = outline
+    side = _SQUARE * max(right - left, bottom - top) / (1 + 2 * _BORDER)
+    person = find_person(photo, np.array([left + right, top + bottom]) / 2, side)
+    facing = (mesh.vertex_normals() * (camera.center - mesh.vertices)).sum(axis=1) > 0
+    seen = camera.project(mesh.vertices[facing])
+    within = ((seen > 0) & (seen < [camera.width, camera.height])).all(axis=1)
+    if not within.any() or np.mean(person.at(seen[within]) > 0.5) < _RECOGNIZED:
+        return None
+    return person.of_photo(camera.width, camera.height)
 
 
 def _outline(mesh: Mesh, camera: Camera) -> tuple[int, int, int, int] | None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mien.arrays import Array
-from mien.assets.detector import detector_model_path
+from mien.assets.networks import detector_model_path
 from mien.capture.faces.mediapipe_face import (
     BLENDSHAPE_NAMES,
     FaceNetwork,

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from mien.arrays import Array, UInt8
-from mien.assets.detector import detector_model_path
+from mien.assets.networks import detector_model_path
 from mien.capture.faces.landmarks import Landmarks, cut_note, facing_confidence, inside_picture
 from mien.capture.faces.mediapipe_face import LEFT_IRIS, RIGHT_IRIS, DetectedFace, FaceNetwork
 from mien.capture.images.photos import Photo, downscale
