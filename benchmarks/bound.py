@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.scenes import Scene
 from mien.arrays import Array
 from mien.numeric.solvers.robust import loss_named
-from mien.reconstruction.bundle.adjustment import Posterior, unknown_poses
+from mien.reconstruction.bundle.adjustment import Posterior, camera_prior
 from mien.reconstruction.bundle.gauge import similarity_constraints
 from mien.reconstruction.bundle.problem import (
     BundleProblem,
@@ -68,7 +68,7 @@ def _covariance(scene: Scene, sigma_px: float) -> Array:
             np.ones(len(photo), bool),
         ),
         PointPrior(np.zeros((count, 3)), np.zeros((0, count, 3)), np.zeros((count, 3, 3))),
-        unknown_poses(scene.cameras, groups),
+        camera_prior(scene.cameras, groups),
     )
     truth = BundleState.of(scene.cameras, scene.points, groups.group, 0)
     system = Posterior(problem, loss_named("linear"), None).normal_equations(truth)

@@ -12,12 +12,19 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.source import CapturedView
 from mien.errors import EstimationError
-from mien.reconstruction.bundle.adjustment import Adjustment, FocalPrior, ShapePrior, adjust_bundle
+from mien.reconstruction.bundle.adjustment import (
+    Adjustment,
+    DistancePrior,
+    FocalPrior,
+    ShapePrior,
+    adjust_bundle,
+)
 from mien.reconstruction.features import Features, image_points_for_cameras, rematch_curves
 from mien.reconstruction.outliers import median_normalized_residuals
 from mien.reconstruction.pose.recovery import recover_pose
 from mien.reconstruction.shape.deformation import vertex_uncertainty
 from mien.reconstruction.shape.from_features import shape_from_features
+from mien.reconstruction.shape.model import ShapeModel, shape_model
 from mien.reconstruction.triangulation import triangulate
 
 FOCAL_PRIOR_DIAGONALS = 1.7
@@ -29,6 +36,8 @@ NAMED_SIGMA_MM = 2.0
 faces and between people who mark them (docs/method/cameras.md)."""
 ATTACHED_SIGMA_MM = 1.5
 """The same for a landmark: the detector that finds it also attached it to the generic head."""
+DISTANCE_PRIOR = DistancePrior(900.0, 0.6)
+"""From where people are photographed: between a selfie's 40 cm and a portrait's 2 m."""
 MIN_DISTANCE_MM = 150.0
 """No photo of a face is taken from nearer to the eyes; a camera there is a diverged solution."""
 PRIOR_DEVIATION_MM = 2.5
@@ -104,16 +113,19 @@ def solve_by_features(
     cameras = tuple(camera for camera in start.cameras if camera is not None)
     points = start.points[features.observed[keep].any(axis=0)]
     features = features.of_photos(keep)
-    vertices = generic.mesh.vertices
+    model = shape_model(views, generic)
+    vertices = model.mean
     for _ in range(options.rounds):
         if options.curves == "epipolar":
             features = rematch_curves(features, views, cameras, generic)
         if options.adjust:
-            adjusted = _adjust(views, features, cameras, points, generic)
+            adjusted = _adjust(views, features, cameras, points, model)
             cameras, points, deviation = adjusted.cameras, adjusted.points, adjusted.point_sd_mm
         else:
             points, deviation = _triangulate(features, cameras, features.on(vertices))
-        vertices = shape_from_features(features, points, cameras, generic, kernel=options.kernel)
+        vertices = shape_from_features(
+            features, points, cameras, generic, model, kernel=options.kernel
+        )
     residuals = residuals_of(features, cameras, vertices)
     uncertainty = vertex_uncertainty(
         vertices, features.on(vertices), deviation, prior_mm=PRIOR_DEVIATION_MM
@@ -126,13 +138,13 @@ def _adjust(
     features: Features,
     cameras: tuple[Camera, ...],
     points: Float[Array, "n 3"],
-    generic: GenericHead,
+    model: ShapeModel,
 ) -> Adjustment:
-    """Cameras and points of highest posterior under the identity prior."""
+    """Cameras and points of highest posterior under the model of shapes."""
     by_hand = features.by_hand.any(axis=0)
     prior = ShapePrior(
-        mean=features.on(generic.mesh.vertices),
-        components=features.on(generic.identity.components),
+        mean=features.on(model.mean),
+        components=features.on(model.components),
         sigma=np.where(by_hand, NAMED_SIGMA_MM, ATTACHED_SIGMA_MM),
     )
     return adjust_bundle(
@@ -144,6 +156,7 @@ def _adjust(
         shape_prior=prior,
         focal_prior=focal_priors(views),
         focal_group=focal_groups(views),
+        distance_prior=DISTANCE_PRIOR,
     )
 
 

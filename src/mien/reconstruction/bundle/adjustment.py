@@ -67,6 +67,19 @@ class FocalPrior:
 
 
 @dataclass(frozen=True)
+class DistancePrior:
+    """What is known of the cameras' distances, log-normal; of use with a shape prior's scale only.
+
+    Attributes:
+        median_mm: of t_z.
+        deviation: standard deviation of its logarithm.
+    """
+
+    median_mm: float
+    deviation: float
+
+
+@dataclass(frozen=True)
 class Adjustment:
     """Cameras and points of highest posterior.
 
@@ -107,6 +120,7 @@ def adjust_bundle(
     shape_prior: ShapePrior | None = None,
     focal_prior: FocalPrior | None = None,
     focal_group: Int[Array, " k"] | None = None,
+    distance_prior: DistancePrior | None = None,
     marginal: bool = True,
     max_iterations: int = 200,
     tolerance: float = 1e-10,
@@ -127,6 +141,7 @@ def adjust_bundle(
         shape_prior: of the points; None where nothing is known.
         focal_prior: of the focal lengths; None where nothing is known.
         focal_group: (K,) photos with the same number share their focal length.
+        distance_prior: of each camera; None where nothing is known.
         marginal: with a shape prior, find the cameras of highest probability with the points
             integrated out, not with the most probable points (bundle.marginal_likelihood).
         max_iterations: of the Levenberg-Marquardt solver.
@@ -152,7 +167,7 @@ def adjust_bundle(
             cameras,
             Observations(photo, point, image[observed], sigma[observed], np.ones(len(photo), bool)),
             PointPrior(shape.mean, shape.components, np.eye(3) / shape.sigma[:, None, None] ** 2),
-            unknown_poses(cameras, groups),
+            camera_prior(cameras, groups, distance_prior),
         ),
         loss_named(loss),
         shape.sigma if marginal and shape_prior is not None else None,
@@ -255,10 +270,17 @@ class Posterior:
         return point_evidence(state.R, state.t, focal_px, precision, mean, self.integrated_sd)
 
 
-def unknown_poses(cameras: Sequence[Camera], groups: FocalGroups) -> CameraPrior:
-    """A prior that knows the focal lengths alone."""
+def camera_prior(
+    cameras: Sequence[Camera], groups: FocalGroups, distance: DistancePrior | None = None
+) -> CameraPrior:
+    """A prior that knows the focal lengths, perhaps the distances, and nothing else."""
     arrays = PinholeArrays.of(cameras)
-    return CameraPrior(arrays.R, arrays.t, groups, np.full(POSE_SIZE, np.inf))
+    deviation = np.full(POSE_SIZE, np.inf)
+    if distance is None:
+        return CameraPrior(arrays.R, arrays.t, groups, deviation)
+    deviation[-1] = distance.deviation
+    mean = np.column_stack([arrays.t[:, :2], np.full(len(cameras), distance.median_mm)])
+    return CameraPrior(arrays.R, mean, groups, deviation)
 
 
 def _checked_shape(shape: ShapePrior | None, count: int) -> ShapePrior:

@@ -15,10 +15,11 @@ from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.reconstruction.features import Features
 from mien.reconstruction.shape.deformation import deform_head
+from mien.reconstruction.shape.model import ShapeModel
 from mien.reconstruction.triangulation import triangulate
 
-IDENTITY_SIGMA_MM = 3.0
-"""How far a feature lies off the identity basis, its meaning on another face included."""
+MODEL_SIGMA_MM = 3.0
+"""How far a feature lies off the model, its meaning on another face included."""
 SEEN_ONCE_SIGMA_MM = 1.0
 """Least standard deviation of a feature that one photo shows: its depth is not measured."""
 
@@ -28,11 +29,12 @@ def shape_from_features(
     points: Float[Array, "n 3"],
     cameras: Sequence[Camera],
     generic: GenericHead,
+    model: ShapeModel,
     *,
     kernel: str = "exponential",
     rounds: int = 2,
 ) -> Float[Array, "v 3"]:
-    """(V, 3) mm: the generic head as this person, then moved to the features.
+    """(V, 3) mm: the model as this person, then moved to the features.
 
     Features observed in several photos come first, since they carry depth. Those observed once are
     then put on their ray at the point nearest to the head, `rounds` times.
@@ -42,16 +44,16 @@ def shape_from_features(
         points: (N, 3) mm, of the features observed twice.
         cameras: of the photos.
         generic: the generic head.
+        model: of what the photos may show.
         kernel: as in fit_rbf.
         rounds: repetitions for features observed once.
 
     Source:
-        [Pighin 2002] sec. 5.1.3, repeated; the identity basis beneath is ours.
+        [Pighin 2002] sec. 5.1.3, repeated; the model beneath is ours.
     """
     twice = features.observed.sum(axis=0) > 1
     deviation = features.sigma_mm.min(axis=0)
-    coefficients = estimate_identity(features, points, generic)
-    vertices = generic.mesh.vertices + generic.identity.offsets(coefficients)
+    vertices = model.vertices(estimate_coefficients(features, points, model))
     if twice.any():
         places = features.on(vertices)[twice]
         vertices = deform_head(
@@ -70,17 +72,15 @@ def shape_from_features(
     return vertices
 
 
-def estimate_identity(
-    features: Features, points: Float[Array, "n 3"], generic: GenericHead
-) -> Float[Array, " k"]:
-    """(K,) coefficients of highest posterior given where the features lie.
+def estimate_coefficients(
+    features: Features, points: Float[Array, "n 3"], model: ShapeModel
+) -> Float[Array, " c"]:
+    """(C,) coefficients of highest posterior given where the features lie.
 
-    Ridge regression: coefficients have deviation 1, features IDENTITY_SIGMA_MM.
+    Ridge regression: coefficients have deviation 1, features MODEL_SIGMA_MM.
     """
-    components = features.on(generic.identity.components).reshape(
-        len(generic.identity.components), -1
-    )
-    offsets = (points - features.on(generic.mesh.vertices)).ravel()
-    precision = IDENTITY_SIGMA_MM**-2
+    components = features.on(model.components).reshape(len(model.components), -1)
+    offsets = (points - features.on(model.mean)).ravel()
+    precision = MODEL_SIGMA_MM**-2
     normal = precision * components @ components.T + np.eye(len(components))
     return np.linalg.solve(normal, precision * components @ offsets)
