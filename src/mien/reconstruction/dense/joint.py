@@ -37,13 +37,24 @@ from mien.reconstruction.bundle.problem import (
 )
 from mien.reconstruction.bundle.projection import POSE_SIZE, Reprojection
 
-__all__ = ["POSE_DEVIATION", "JointSolution", "noise_factor", "reprojection", "solve_jointly"]
+__all__ = [
+    "INDEPENDENT_POINTS",
+    "POSE_DEVIATION",
+    "JointSolution",
+    "noise_factor",
+    "noise_variance",
+    "reprojection",
+    "solve_jointly",
+]
 
 POSE_DEVIATION = np.array([0.1, 0.1, 0.1, 30.0, 30.0, 0.6])
 """Of a camera from where landmarks put it: rotation (rad); x and y (mm), log depth."""
 _EXPECTED_MEDIAN = 0.5
 """Of the residuals over their sigmas, where matches are as good as on sharp photos. Where they are
 not (small, compressed or moving faces), all sigmas grow until it is met."""
+INDEPENDENT_POINTS = 150
+"""What the prior does not express, and what differs between photos, goes together over 15 to 20 mm
+of skin: however many points are followed on a face, they are no more than so many."""
 _MAX_STEP = 0.3
 """Radians, or relative change of depth and focal length: beyond, linear steps mean nothing."""
 _POINT_STEPS = 2
@@ -138,8 +149,8 @@ def reprojection(problem: BundleProblem, state: BundleState) -> Reprojection:
     residuals = projection.image_points - problem.image
     squared = (residuals**2).sum(axis=1)
     variance, matches = problem.observations.sigma_px**2, problem.observations.for_cameras
-    noise = noise_factor(np.sqrt(squared / variance)[matches])
-    weights = 1 / (variance * np.where(matches, noise**2, 1.0) + squared)
+    noise = noise_variance(np.sqrt(squared / variance)[matches], len(state.points))
+    weights = 1 / (variance * np.where(matches, noise, 1.0) + squared)
     return Reprojection(projection, residuals, weights)
 
 
@@ -147,6 +158,16 @@ def noise_factor(normalized_residuals: Float[Array, " m"]) -> float:
     """How many times their sigmas the errors of matches are, at least 1."""
     median = float(np.median(normalized_residuals)) if len(normalized_residuals) else 0.0
     return max(1.0, median / _EXPECTED_MEDIAN)
+
+
+def noise_variance(normalized_residuals: Float[Array, " m"], points: int) -> float:
+    """By how much the variance of matches of so many points is larger than their sigmas say.
+
+    What exceeds the sigmas is no error of single matches but of what the photos show: skin that
+    moved, light, hair. Its neighbours share it, so that many points tell no more than few.
+    """
+    excess = noise_factor(normalized_residuals) ** 2 - 1
+    return 1 + excess * max(1.0, points / INDEPENDENT_POINTS)
 
 
 def solve_equations(matrix: Float[Array, "q q"], right: Float[Array, " q"]) -> Float[Array, " q"]:

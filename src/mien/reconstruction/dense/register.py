@@ -17,7 +17,7 @@ from mien.progress import StepProgress, no_step_progress
 from mien.reconstruction.bundle.problem import FocalGroups, Observations, PointPrior
 from mien.reconstruction.dense.crops import finest_mm_per_px, visible_mesh
 from mien.reconstruction.dense.eyeballs import fit_eyeballs
-from mien.reconstruction.dense.joint import JointSolution, solve_jointly
+from mien.reconstruction.dense.joint import INDEPENDENT_POINTS, JointSolution, solve_jointly
 from mien.reconstruction.dense.prior import HeadPrior, load_head_prior
 from mien.reconstruction.dense.quality import (
     MIN_SHARED_POINTS,
@@ -42,9 +42,6 @@ ALONG_SD_MM, ACROSS_SD_MM = 10.0, 1.0
 slid) and across it."""
 HAIR_SD_MM = 10.0
 """Across the surface where hair covers it."""
-INDEPENDENT_POINTS = 150
-"""What the prior does not express goes together over 15 to 20 mm of skin: however many points are
-followed on a face, they constrain the prior's coefficients no more than so many."""
 ATTACHED_SD_MM, NAMED_SD_MM = 1.5, 6.0
 """How far a landmark's point lies off its attachment on the prior, and a hand-made mark's off the
 vertex of its name: people differ in what they mean by one, and marks count in the end, not here."""

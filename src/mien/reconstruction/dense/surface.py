@@ -15,7 +15,7 @@ from mien.camera import Camera
 from mien.mesh import Mesh
 from mien.numeric.segment_sum import SegmentSum
 from mien.reconstruction.bundle.projection import PinholeArrays, project_points
-from mien.reconstruction.dense.joint import noise_factor
+from mien.reconstruction.dense.joint import noise_variance
 from mien.reconstruction.dense.tracks import Tracks
 from mien.reconstruction.shape.deformation import with_round_eyes
 
@@ -74,7 +74,7 @@ def measure_offsets(
     offsets: Array = ((points - start) * normals).sum(axis=1)
     sd = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariance, normals))
     # Places that share a patch of the matching share its error.
-    sd *= noise_factor(np.sqrt(squared)) * np.sqrt(tracks.overlap)
+    sd *= np.sqrt(noise_variance(np.sqrt(squared), len(start)) * tracks.overlap)
     return Offsets(offsets, np.maximum(sd, MIN_SD_MM))
 
 
