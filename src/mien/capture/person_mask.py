@@ -8,6 +8,7 @@ import numpy as np
 
 from mien.arrays import Array, Bool, Float, UInt8
 from mien.assets.networks import person_model_path
+from mien.numeric.images.sampling import sample_bilinear
 
 _SIDE = 256
 """px; of the network's input and output."""
@@ -36,13 +37,10 @@ class PersonMask:
 
     def at(self, points: Float[Array, "n 2"]) -> Float[Array, " n"]:
         """The probability at points of the photo, px; 0 outside of the square."""
-        import cv2
-
-        places = ((points - self.left_top) / self.px - 0.5).astype(np.float32)
-        columns, rows = (np.ascontiguousarray(axis) for axis in places.T)
-        return cv2.remap(
-            self.alpha, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
-        )[:, 0]
+        places = (points - self.left_top) / self.px
+        height, width = self.alpha.shape
+        inside = ((places > 0) & (places < [width, height])).all(axis=1)
+        return np.where(inside, sample_bilinear(self.alpha[..., None], places)[:, 0], 0.0)
 
     def of_photo(self, width: int, height: int) -> Bool[Array, "h w"]:
         """(H, W) of a photo of this size, where the person is likelier than not."""

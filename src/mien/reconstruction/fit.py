@@ -28,6 +28,7 @@ from mien.reconstruction.registration import register_solution
 from mien.reconstruction.result import NeutralFit, PhotoFit
 from mien.reconstruction.shape.deformation import eye_centers
 from mien.reconstruction.shape.feature_alignment import align_features
+from mien.reconstruction.shape.outline import fit_outline
 
 __all__ = ["FitOptions", "NeutralFit", "fit_views"]
 
@@ -141,6 +142,7 @@ def _with_aligned_features(solution: Solution, generic: GenericHead) -> Solution
     vertices = align_features(
         solution.vertices, features, cameras, generic, measured=bool(solution.matches)
     )
+    vertices = fit_outline(vertices, solution.views, cameras, generic)
     residuals = residuals_of(features, cameras, vertices)
     return replace(solution, vertices=vertices, residuals=residuals)
 
