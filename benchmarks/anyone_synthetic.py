@@ -1,4 +1,4 @@
-"""Photos of people that are known exactly, as people take them: any lens, crop, light and expression.
+"""Photos of people that are known exactly: any lens, crop, light and expression.
 
 A person is drawn from the identity basis and, since nobody lies in a basis, bent smoothly besides.
 """
@@ -97,7 +97,7 @@ def random_photo(
     name = expression or str(rng.choice(list(EXPRESSIONS)))
     vertices = _person(rng, generic) + _expressed(rng, generic, EXPRESSIONS[name])
     camera = _camera(rng, distance_mm)
-    texture = textures[rng.integers(len(textures))]
+    texture = textures[int(rng.integers(len(textures)))]
     shading = _shading(rng, generic, vertices)
     face = PosedFace(vertices, np.ones((len(vertices), 1)), shading)
     parts = tuple(part for part in generic.mesh.part_names if part not in ("hair", "lashes"))
@@ -152,7 +152,7 @@ def _shading(
     rng: np.random.Generator, generic: GenericHead, vertices: Float[Array, "v 3"]
 ) -> Float[Array, " v"]:
     """(V,) brightness under a lamp and the light of the room."""
-    lamp = rng.normal(size=3) + [0, 0.7, 1.5]
+    lamp = rng.normal(size=3) + np.array([0, 0.7, 1.5])
     lamp /= np.linalg.norm(lamp)
     normals = generic.mesh.with_vertices(vertices).vertex_normals()
     ambient = rng.uniform(0.5, 1.0)

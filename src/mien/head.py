@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from importlib.metadata import version
+from typing import Literal
 
 import numpy as np
 
@@ -19,6 +20,31 @@ CYLINDER = "cylinder"
 SHADING = {"eyes": (0.62, 0.52, -0.14), "teeth": (0.45, 3.0, -4.0)}
 """Brightness of eyes and teeth as photographs usually have it: c0 + c1 o + c2 o^2, o being the gap
 between the lids over neutral's, or that between the lips over the mouth's width."""
+
+
+Grade = Literal["good", "fair", "poor"]
+GRADES: tuple[Grade, ...] = ("good", "fair", "poor")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How far a head is to be believed.
+
+    Attributes:
+        grade: "good": measured from several sides; "fair": what photos leave open comes from the
+            prior of faces; "poor": the photos contradict each other, or what people look like.
+        reasons: why it is no better, in plain sentences.
+    """
+
+    grade: Grade
+    reasons: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.grade not in GRADES:
+            raise InputError("grade", " or ".join(GRADES), self.grade)
+
+    def __str__(self) -> str:
+        return f"{self.grade} ({'; '.join(self.reasons)})" if self.reasons else self.grade
 
 
 @dataclass(frozen=True)
@@ -101,6 +127,7 @@ class Head:
         shading: coefficients of the brightness of "eyes" and "teeth" by how far lids and lips are
             open ([Pighin 2002] sec. 5.2.4).
         left_out: the reason by photo name for every photo that did not fit.
+        verdict: how far it is to be believed; None in heads of older versions.
         generator: the program that made it.
 
     Raises:
@@ -117,6 +144,7 @@ class Head:
     regions: dict[str, Float[Array, " v"]] = field(default_factory=dict)
     shading: dict[str, tuple[float, float, float]] = field(default_factory=lambda: dict(SHADING))
     left_out: dict[str, str] = field(default_factory=dict)
+    verdict: Verdict | None = None
     generator: str = field(default_factory=lambda: f"mien {version('mien')}")
 
     def __post_init__(self) -> None:

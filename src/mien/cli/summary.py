@@ -10,6 +10,7 @@ from mien.pipelines.build import Build
 
 def summary_json(result: Build, folder: Path) -> dict[str, Any]:
     """For `--json`."""
+    verdict = result.head.verdict
     return {
         "head": str(folder),
         "report": str(folder / "report.html"),
@@ -27,6 +28,8 @@ def summary_json(result: Build, folder: Path) -> dict[str, Any]:
             for name, expression in result.head.expressions.items()
         },
         "left_out": result.head.left_out,
+        "grade": verdict.grade if verdict else None,
+        "reasons": list(verdict.reasons) if verdict else [],
         "notes": list(result.notes),
     }
 
@@ -39,6 +42,8 @@ def summary_text(result: Build, folder: Path) -> str:
     ]
     if len(result.head.expressions) > 1:
         lines.insert(0, f"  expressions: {', '.join(result.head.expressions)}")
+    if result.head.verdict is not None:
+        lines.append(f"  grade: {result.head.verdict}")
     lines += [f"  note: {note}" for note in result.notes]
     return "\n".join(
         [

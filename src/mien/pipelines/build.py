@@ -12,6 +12,7 @@ from mien.arrays import Array, Float, UInt8
 from mien.assets.generic import GenericHead, load_generic_head
 from mien.capture.annotations import save_annotations
 from mien.capture.folder import photo_files
+from mien.capture.photo_sorting import sort_by_expression, sorting_notes
 from mien.capture.source import Capture, load_capture
 from mien.errors import EstimationError
 from mien.head import ATLAS, NEUTRAL, Expression, FittedView, Head
@@ -153,7 +154,15 @@ def _load_capture(source: str | Path, options: BuildOptions, progress: StepProgr
     )
     if NEUTRAL not in capture.expressions:
         raise EstimationError(f"{source}: no photo in {NEUTRAL} shows a face that can be used")
-    return _named_by_expression(capture)
+    if list(capture.expressions) != [NEUTRAL]:
+        return _named_by_expression(capture)
+    return _sorted(capture)
+
+
+def _sorted(capture: Capture) -> Capture:
+    """Photos from life in one folder: those of another expression are no part of neutral."""
+    found = sort_by_expression(capture.expressions[NEUTRAL])
+    return replace(capture, expressions=found, notes=(*capture.notes, *sorting_notes(found)))
 
 
 def _fit_neutral(
@@ -196,9 +205,7 @@ def _part(number: int, capture: Capture, progress: StepProgress) -> StepProgress
 
 
 def _named_by_expression(capture: Capture) -> Capture:
-    """Where there are expression folders, photos are EXPRESSION/PHOTO: names may repeat in them."""
-    if list(capture.expressions) == [NEUTRAL]:
-        return capture
+    """Of expression folders and clips: photos are EXPRESSION/PHOTO, as names may repeat."""
     expressions = {
         name: tuple(
             replace(view, photo=replace(view.photo, name=f"{name}/{view.photo.name}"))
@@ -228,6 +235,7 @@ def _untextured_head(
         unit_offsets=known.units,
         regions=default_masks(generic),
         left_out=left_out,
+        verdict=neutral.verdict,
     )
 
 

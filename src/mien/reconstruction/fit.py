@@ -13,6 +13,7 @@ from mien.camera import Camera
 from mien.capture.faces.detector import NO_FACE_FOUND
 from mien.capture.source import CapturedView
 from mien.errors import EstimationError
+from mien.head import Verdict
 from mien.progress import StepProgress
 from mien.reconstruction.features import gather_features
 from mien.reconstruction.landmark_fit import FitOptions, Solution, residuals_of, solve_by_features
@@ -24,10 +25,12 @@ from mien.reconstruction.outliers import (
     largest_view_angle,
     name_notes,
 )
+from mien.reconstruction.plausibility import edge_residual, judge, measure_oddness
 from mien.reconstruction.registration import register_solution
 from mien.reconstruction.result import NeutralFit, PhotoFit
 from mien.reconstruction.shape.deformation import eye_centers
 from mien.reconstruction.shape.feature_alignment import align_features
+from mien.reconstruction.shape.model import shape_model
 from mien.reconstruction.shape.outline import fit_outline
 
 __all__ = ["FitOptions", "NeutralFit", "fit_views"]
@@ -35,6 +38,10 @@ __all__ = ["FitOptions", "NeutralFit", "fit_views"]
 MIN_VIEW_ANGLE_DEG = 10.0
 """Photos whose viewing directions, from landmarks alone, differ by less do not determine depth."""
 SAME_SIDE = "it looks from the same side as {}, and would only blur what that one shows"
+WRONG_FOCAL = (
+    "{}: the focal length that the file states does not fit the photos, and is not used; was it "
+    "cropped after it was taken?"
+)
 MIN_DISTANCE_RATIO = 1.3
 """Unless one is taken from so many times the distance of another: perspective shows depth, too."""
 
@@ -65,7 +72,20 @@ def fit_views(
 
     # The matrices are small: BLAS threads that wait for each other cost several times the work.
     with threadpool_limits(1, user_api="blas"):
-        return _fit_views(views, generic, options, progress)
+        fit, doubted = _fit_views(views, generic, options, progress)
+        stating = [view.photo.name for view in views if view.photo.focal_prior_px is not None]
+        if not stating or (fit.is_plausible and not doubted):
+            return fit
+        free = [_without_focal(view) for view in views]
+        again, _ = _fit_views(free, generic, options, progress)
+        if not again.is_plausible:
+            return fit
+        note = WRONG_FOCAL.format(", ".join(doubted or stating))
+        return replace(again, notes=(note, *again.notes))
+
+
+def _without_focal(view: CapturedView) -> CapturedView:
+    return replace(view, photo=replace(view.photo, focal_prior_px=None))
 
 
 def _fit_views(
@@ -73,7 +93,8 @@ def _fit_views(
     generic: GenericHead,
     options: FitOptions,
     progress: StepProgress | None,
-) -> NeutralFit:
+) -> tuple[NeutralFit, Sequence[str]]:
+    """The fit, and the photos whose stated focal length it contradicts."""
     marked = [view for view in views if view.marked]
     faceless = [view for view in views if not view.marked]
     if not marked:
@@ -94,6 +115,7 @@ def _fit_views(
         left_out |= solution.problems
     else:
         left_out |= {view.photo.name: NO_FACE_FOUND for view in faceless}
+    verdict = _verdict(solution, generic)
     if options.adjust:
         solution = _with_aligned_features(solution, generic)
     vertices, cameras = _in_head_space(solution, generic, options)
@@ -104,7 +126,27 @@ def _fit_views(
         matches, rms_px = solution.matches[k] if solution.matches else (0, 0.0)
         photos[view.photo.name] = PhotoFit(camera, marks, matches, rms_px)
     notes = (*depth_notes(cameras), *solution.notes, *name_notes(photos))
-    return NeutralFit(vertices, photos, left_out, notes, uncertainty_mm=solution.uncertainty_mm)
+    fit = NeutralFit(
+        vertices,
+        photos,
+        left_out,
+        notes,
+        uncertainty_mm=solution.uncertainty_mm,
+        verdict=verdict,
+        registered=bool(solution.matches),
+    )
+    return fit, solution.focal_doubts
+
+
+def _verdict(solution: Solution, generic: GenericHead) -> Verdict:
+    """Of the solution before its features and outline are fitted, which move what they must."""
+    return judge(
+        solution.cameras,
+        measure_oddness(solution.vertices, shape_model(solution.views, generic), generic),
+        edge_residual(solution.features, solution.cameras, solution.residuals),
+        registered=bool(solution.matches),
+        doubts=solution.notes if solution.matches else (),
+    )
 
 
 def _registered(

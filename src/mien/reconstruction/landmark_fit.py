@@ -71,7 +71,21 @@ class FitOptions:
 
 @dataclass(frozen=True)
 class Solution:
-    """Cameras and shape in the frame and scale of the solver."""
+    """Cameras and shape in the frame and scale of the solver.
+
+    Attributes:
+        views: K photos.
+        features: of the same photos.
+        cameras: of the same photos.
+        vertices: (V, 3) mm.
+        residuals: (K, N, 2) px, of the features.
+        uncertainty_mm: (V,) standard deviation of each vertex.
+        problems: why other photos were left out, by name.
+        notes: for the user.
+        matches: by photo, count and RMS (px) of the points that it shares with others; () without
+            registration.
+        focal_doubts: photos whose stated focal length the others contradict.
+    """
 
     views: Sequence[CapturedView]
     features: Features
@@ -82,6 +96,7 @@ class Solution:
     problems: dict[str, str]
     notes: tuple[str, ...] = ()
     matches: tuple[tuple[int, float], ...] = ()
+    focal_doubts: tuple[str, ...] = ()
 
     @property
     def median_normalized_residuals(self) -> Float[Array, " k"]:

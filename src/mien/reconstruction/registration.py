@@ -24,6 +24,13 @@ from mien.reconstruction.dense.register import (
 from mien.reconstruction.features import gather_features
 from mien.reconstruction.landmark_fit import Solution, focal_groups, focal_priors, residuals_of
 from mien.reconstruction.localization.localizer import localize_views
+from mien.reconstruction.plausibility import (
+    MAX_EDGE_RESIDUAL,
+    distance_problems,
+    edge_residual,
+    measure_oddness,
+)
+from mien.reconstruction.shape.model import shape_model
 
 NOTHING_SHARED = (
     "the photos share too little skin to be registered with each other: cameras and shape rest on "
@@ -33,13 +40,9 @@ NOTHING_SHARED = (
 MAX_ROTATION_DEG = 25.0
 """Landmarks leave cameras up to 16 degrees off."""
 INCONSISTENT_REGISTRATION = (
-    "the photos could not be registered with each other (what would follow contradicts the "
-    "landmarks, as where all look from nearly one side): cameras and shape rest on marks and "
-    "landmarks alone"
+    "the photos could not be registered with each other ({}, as where all look from nearly one "
+    "side, or show different days or people): cameras and shape rest on marks and landmarks alone"
 )
-MAX_EDGE_RESIDUAL = 1.5
-"""Expected errors by which the landmarks on edges lie off in the median. Registered heads have 0.4
-to 0.7; one that has followed noise had 2.4."""
 NOT_LOCALIZED = "no face was found in it, and it does not look like the head that the others show"
 
 
@@ -105,12 +108,10 @@ def _registered(
     if found is None:
         return replace(solution, uncertainty_mm=deviation_from_features(*known), notes=notes)
     residuals = residuals_of(solution.features, found.cameras, found.vertices)
-    if _edge_residual(solution, found, residuals) > MAX_EDGE_RESIDUAL:
-        return replace(
-            solution,
-            uncertainty_mm=deviation_from_features(*known),
-            notes=(INCONSISTENT_REGISTRATION,),
-        )
+    problems = _problems(solution, found, residuals, generic)
+    if problems:
+        note = INCONSISTENT_REGISTRATION.format("; ".join(problems))
+        return replace(solution, uncertainty_mm=deviation_from_features(*known), notes=(note,))
     quality = found.quality
     names = [view.photo.name for view in views]
     return replace(
@@ -120,20 +121,27 @@ def _registered(
         residuals=residuals,
         uncertainty_mm=found.deviation_mm,
         notes=(*quality.notes(names), *_far_turned(names, solution.cameras, found.cameras)),
+        focal_doubts=tuple(
+            name for name, doubted in zip(names, found.focal_doubts, strict=True) if doubted
+        ),
         matches=tuple(zip(quality.shared.tolist(), quality.rms_px.tolist(), strict=True)),
     )
 
 
-def _edge_residual(
-    solution: Solution, found: Registration, residuals: Float[Array, "k n 2"]
-) -> float:
-    """Median normalized residual of the landmarks on edges; 0 without landmarks."""
-    features = solution.features
-    used = features.observed & features.on_edges
-    if not used.any():
-        return 0.0
-    off = np.linalg.norm(residuals, axis=2)[used] / features.sigma_px(found.cameras)[used]
-    return float(np.median(off))
+def _problems(
+    solution: Solution,
+    found: Registration,
+    residuals: Float[Array, "k n 2"],
+    generic: GenericHead,
+) -> list[str]:
+    """Why a registration is not to be believed, if it is not."""
+    problems = [*distance_problems(found.cameras)]
+    if edge_residual(solution.features, found.cameras, residuals) > MAX_EDGE_RESIDUAL:
+        problems.append("what would follow contradicts the landmarks")
+    model = shape_model(solution.views, generic)
+    if measure_oddness(found.vertices, model, generic).exceeds():
+        problems.append("what would follow is no head")
+    return problems
 
 
 def _far_turned(

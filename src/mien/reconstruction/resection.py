@@ -52,13 +52,15 @@ def _resect(
     width, height = view.photo.size
     centred = image - [width / 2, height / 2]
     intrinsics = np.diag([focal_px, focal_px, 1.0])
-    try:
-        solved, rotation_vector, translation = cv2.solvePnP(
-            points, centred, intrinsics, None, flags=cv2.SOLVEPNP_SQPNP
-        )
-    except cv2.error:  # Points that lie in one place.
-        solved = False
-    if not solved or translation[2, 0] <= 0:
-        raise EstimationError(f"{view.photo.name}: no camera sees its points so")
-    rotation, _ = cv2.Rodrigues(rotation_vector)
-    return Camera(width, height, focal_px, rotation, translation.ravel())
+    # The first fails before long lenses, which see almost without perspective.
+    for method in (cv2.SOLVEPNP_SQPNP, cv2.SOLVEPNP_ITERATIVE):
+        try:
+            solved, rotation_vector, translation = cv2.solvePnP(
+                points, centred, intrinsics, None, flags=method
+            )
+        except cv2.error:  # Points that lie in one place.
+            continue
+        if solved and translation[2, 0] > 0:
+            rotation, _ = cv2.Rodrigues(rotation_vector)
+            return Camera(width, height, focal_px, rotation, translation.ravel())
+    raise EstimationError(f"{view.photo.name}: no camera sees its points so")

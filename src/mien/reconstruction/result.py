@@ -8,6 +8,7 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.camera import Camera
+from mien.head import Verdict
 
 
 @dataclass(frozen=True)
@@ -96,9 +97,18 @@ class NeutralFit(Fit):
 
     Attributes:
         uncertainty_mm: (V,) standard deviation of each vertex, all axes together.
+        verdict: how far it is to be believed.
+        registered: whether its photos were registered by all the skin that they share.
     """
 
     uncertainty_mm: Float[Array, " v"]
+    verdict: Verdict
+    registered: bool
+
+    @property
+    def is_plausible(self) -> bool:
+        """Whether it is a head, and its photos, where there are several, agree on it."""
+        return self.verdict.grade != "poor" and (self.registered or len(self.photos) == 1)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -65,6 +65,7 @@ def render_report(data: ReportInput, *, progress: StepProgress = no_step_progres
         vertices=f"{len(data.head.mesh.vertices):,}",
         interpupillary_mm=float(np.linalg.norm(left - right)),
         notes=data.notes,
+        verdict=data.head.verdict,
         previews=preview_pictures(data.head),
         coverage=coverage_pictures(data.head, data.coverage),
         uncertainty=uncertainty_pictures(data.head),

@@ -77,7 +77,7 @@ def choose_frames(scores: FrameScores, count: int) -> Int[Array, " m"]:
     pose, sharpness = scores.pose[usable], scores.sharpness[usable]
     if np.ptp(pose, axis=0).max() < _ONE_SIDE:
         # More views would not determine depth, and blur the texture.
-        distances = _distance_from_rest(scores)[usable]
+        distances = distance_from_rest(scores)[usable]
         at_rest = distances <= distances.min() + _MAX_EXCESS_STILL
         return usable[[int(np.where(at_rest, sharpness, -np.inf).argmax())]]
     distance = np.linalg.norm(pose, axis=1)
@@ -97,7 +97,7 @@ def _usable(scores: FrameScores) -> Int[Array, " m"]:
     """Rows of frames near enough to frontal, at rest, and sharp beside the others."""
     frontal = np.abs(scores.pose[:, 0]) <= MAX_YAW
     rows = np.flatnonzero(frontal if frontal.any() else np.ones_like(frontal))
-    distances = _distance_from_rest(scores)[rows]
+    distances = distance_from_rest(scores)[rows]
     most = int(distances.argmin())
     alike = expression_distance(scores.blendshapes[rows], most) <= _SAME_EXPRESSION
     rows = rows[alike & (distances <= distances[most] + _MAX_EXCESS)]
@@ -112,7 +112,7 @@ def sharp_rows(scores: FrameScores, rows: Int[Array, " n"]) -> Int[Array, " m"]:
     return rows[sharpness >= _MIN_SHARPNESS * np.median(sharpness)]
 
 
-def _distance_from_rest(scores: FrameScores) -> Float[Array, " n"]:
+def distance_from_rest(scores: FrameScores) -> Float[Array, " n"]:
     """Distance of each frame's expression from a face at rest.
 
     A mouth at rest is closed. Brows and eyes at rest differ between people, as do their scores:

@@ -29,6 +29,7 @@ from mien.io.head.head_json import (
     texts_from_json,
     texture_paths,
     units_and_gaze_from_json,
+    verdict_from_json,
     views_from_json,
 )
 from mien.io.head.region_masks import MASK_FILES, load_masks, save_masks
@@ -171,6 +172,7 @@ def _head_from(folder: Path, data: JsonValue) -> Head:
         regions=load_masks(folder, geometry.mesh),
         shading=shading_from_json(data),
         left_out=texts_from_json(data["left_out"]),
+        verdict=verdict_from_json(data),
         generator=data["generator"].text(),
     )
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from mien.camera import Camera
 from mien.errors import DocumentError, InputError
-from mien.head import SHADING, FittedView, Head
+from mien.head import GRADES, SHADING, FittedView, Grade, Head, Verdict
 from mien.limits import MAX_PHOTO_SIDE, UNIT_RANGE
 from mien.reading.names import is_inside
 from mien.reading.strict_json import DocumentFormat, JsonValue
@@ -57,6 +57,7 @@ def head_to_json(head: Head, photo_files: Mapping[str, str]) -> Json:
         "photos": dict(photo_files),
         "shading": {part: list(terms) for part, terms in head.shading.items()},
         "left_out": dict(head.left_out),
+        **_verdict_to_json(head.verdict),
         "face_units": list(head.unit_names),
     }
 
@@ -108,6 +109,21 @@ def shading_from_json(data: JsonValue) -> dict[str, tuple[float, float, float]]:
     data["shading"].members(SHADING)
     terms = {part: data["shading"][part].array(3).tolist() for part in SHADING}
     return {part: (c0, c1, c2) for part, (c0, c1, c2) in terms.items()}
+
+
+def verdict_from_json(data: JsonValue) -> Verdict | None:
+    """How far the head is to be believed; None of an older one. Raises: DocumentError."""
+    if "verdict" not in data:
+        return None
+    verdict = data["verdict"]
+    grade = verdict["grade"].choice("grade", GRADES)
+    return Verdict(cast(Grade, grade), tuple(text.text() for text in verdict["reasons"].items()))
+
+
+def _verdict_to_json(verdict: Verdict | None) -> Json:
+    if verdict is None:
+        return {}
+    return {"verdict": {"grade": verdict.grade, "reasons": list(verdict.reasons)}}
 
 
 def _view_to_json(view: FittedView) -> Json:

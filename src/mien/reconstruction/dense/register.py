@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mien.arrays import Array, Float
+from mien.arrays import Array, Bool, Float
 from mien.assets.generic import GenericHead
 from mien.camera import Camera
 from mien.capture.source import CapturedView
@@ -15,6 +15,7 @@ from mien.mesh import Mesh
 from mien.numeric.rotation import angle_between
 from mien.progress import StepProgress, no_step_progress
 from mien.reconstruction.bundle.problem import FocalGroups, Observations, PointPrior
+from mien.reconstruction.bundle.projection import POSE_SIZE
 from mien.reconstruction.dense.crops import finest_mm_per_px, visible_mesh
 from mien.reconstruction.dense.eyeballs import fit_eyeballs
 from mien.reconstruction.dense.joint import INDEPENDENT_POINTS, JointSolution, solve_jointly
@@ -47,6 +48,10 @@ ATTACHED_SD_MM, NAMED_SD_MM = 1.5, 6.0
 vertex of its name: people differ in what they mean by one, and marks count in the end, not here."""
 LANDMARK_SIGMA_FACTOR = 4.0
 """Landmarks err together, not each by itself: so many times their sigma."""
+KNOWN_FOCAL, FREE_FOCAL = 0.3, 0.6
+"""Standard deviation of a log focal length that a file states, below; and of one that is free."""
+MIN_FOCAL_DOUBT = np.log(1.25)
+"""A focal length that photos contradict by less is believed."""
 CONVERGED_RAD = np.deg2rad(1.0)
 COARSE_ROUNDS = 4
 MIN_TRACKED_POINTS = 150
@@ -62,12 +67,14 @@ class Registration:
         vertices: (V, 3) mm, in the prior's frame and scale.
         deviation_mm: (V,) standard deviation of each vertex, all axes together.
         quality: what the photos say of each other.
+        focal_doubts: (K,) whether the photos contradict the focal length that is known of one.
     """
 
     cameras: tuple[Camera, ...]
     vertices: Float[Array, "v 3"]
     deviation_mm: Float[Array, " v"]
     quality: RegistrationQuality
+    focal_doubts: Bool[Array, " k"]
 
 
 def register_views(
@@ -122,7 +129,8 @@ def register_views(
     )
     progress(len(scales) + 1, len(scales) + 1)
     quality = assess_registration(tracks, solution, generic)
-    return Registration(state.cameras, vertices, deviation, quality)
+    doubts = problem.doubted_focal_lengths(state, tracks)
+    return Registration(state.cameras, vertices, deviation, quality, doubts[focal.group])
 
 
 def deviation_from_features(
@@ -177,6 +185,20 @@ class _Problem:
         """The surface where the photos put it."""
         offsets = measure_offsets(tracks, cameras, self.generic.mesh.with_vertices(vertices))
         return move_surface(vertices, tracks, offsets, self.generic), offsets
+
+    def doubted_focal_lengths(self, state: _State, tracks: Tracks) -> Bool[Array, " g"]:
+        """(G,) which known focal lengths leave their priors when the photos alone decide."""
+        focal = self.focal
+        known = focal.deviation < KNOWN_FOCAL
+        if not known.any():
+            return known
+        loose = replace(focal, deviation=np.maximum(focal.deviation, FREE_FOCAL))
+        solution = replace(self, focal=loose).solve(state, tracks)
+        groups = len(focal.log_focal)
+        first = POSE_SIZE * len(self.views)
+        variance = np.diagonal(solution.covariance)[first : first + groups]
+        off = np.abs(solution.state.log_focal - focal.log_focal)
+        return known & (off > np.maximum(MIN_FOCAL_DOUBT, 3 * np.sqrt(variance)))
 
     def solve(self, state: _State, tracks: Tracks) -> JointSolution:
         """Tracks and features together: points on the mesh, what photos show of them, prior."""
