@@ -11,6 +11,7 @@ import numpy as np
 
 from mien.arrays import Array, Float, Int, UInt8
 from mien.capture.faces.detector import LandmarkDetector, refine_small_face
+from mien.capture.faces.frame_faces import FrameFaces
 from mien.capture.faces.mediapipe_face import DetectedFace
 from mien.capture.faces.sharpness import face_sharpness
 from mien.capture.folder import ignored_files, orphaned_annotations, photo_files
@@ -151,10 +152,10 @@ class _SeriesBuilder:
         video = Video(self.source)
         turn_upright(video, detector)
         self.quarters = video.quarters
-        total, clip_notes = video.info().frames, ClipNotes()
+        total, clip_notes, finder = video.info().frames, ClipNotes(), FrameFaces(detector)
         with frames_ahead(video, max_side=self.max_side) as pictures:
             for picture in pictures:
-                faces = detector.detect_all_fast(picture.pixels)
+                faces = finder.find(picture.pixels)
                 clip_notes.add_frame(picture.pixels, faces)
                 if not faces:
                     self.left_out[frame_name(picture.frame)] = "no face found"

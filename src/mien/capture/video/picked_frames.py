@@ -9,9 +9,10 @@ import numpy as np
 
 from mien.arrays import Array, Int, check_positive
 from mien.capture.faces.detector import LandmarkDetector
+from mien.capture.faces.frame_faces import FrameFaces
 from mien.capture.faces.mediapipe_face import DetectedFace
 from mien.capture.faces.sharpness import face_sharpness
-from mien.capture.images.photos import DEFAULT_MAX_SIDE, Photo, downscale
+from mien.capture.images.photos import DEFAULT_MAX_SIDE, Photo
 from mien.capture.video.clip_notes import ClipNotes
 from mien.capture.video.expression_selection import choose_expressions, name_expressions
 from mien.capture.video.frame_photos import fetch_frames
@@ -120,7 +121,7 @@ def _score_frames(video: Video, detector: LandmarkDetector, report: StepProgress
     """Scores of the frames, evenly spread in time, that show a face."""
     step = max(_SAMPLE_SECONDS, (video.info().seconds or 0) / MAX_SAMPLES)
     rows: list[tuple[int, float, DetectedFace]] = []
-    clip_notes = ClipNotes()
+    clip_notes, finder = ClipNotes(), FrameFaces(detector, _ANALYSIS_SIDE)
     due = -np.inf
     for frame in video.frames():
         report(0, frame.index)
@@ -129,12 +130,11 @@ def _score_frames(video: Video, detector: LandmarkDetector, report: StepProgress
             continue
         due = frame.seconds + step
         pixels = frame.pixels()
-        small = downscale(pixels, _ANALYSIS_SIDE)
-        faces = detector.detect_all_fast(small)
-        clip_notes.add_frame(small, faces)
+        faces = finder.find(pixels)
+        clip_notes.add_frame(pixels, faces)
         if faces:
-            points = faces[0].points[:, :2] * (max(pixels.shape) / max(small.shape))
-            rows.append((frame.index, face_sharpness(pixels, points), faces[0]))
+            sharpness = face_sharpness(pixels, faces[0].points[:, :2])
+            rows.append((frame.index, sharpness, faces[0]))
     if not rows:
         raise EstimationError(f"{video.path}: no face found in any of its frames")
     video.notes += clip_notes.notes
