@@ -121,6 +121,7 @@ def build_head(
     capture = _load_capture(source, options, stage_progress(progress, "Finding faces"))
     solving = stage_progress(progress, SOLVING)
     neutral, known = _fit_neutral(capture, generic, options.fit, solving)
+    capture = _with_turned_over(capture, neutral)
     expressions, notes = _fit_expressions(capture, known, solving)
     fits: dict[str, Fit] = {NEUTRAL: neutral, **expressions}
     capture = replace(
@@ -173,10 +174,19 @@ def _fit_neutral(
     views = capture.expressions[NEUTRAL]
     fit = fit_views(views, generic, options, progress=_part(0, capture, progress))
     fit = replace(fit, vertices=close_lips(generic, fit.vertices))
+    turned = {view.photo.name: view for view in fit.turned_over}
+    views = tuple(turned.get(view.photo.name, view) for view in views)
     views = tuple(view for view in views if view.photo.name in fit.photos)
     cameras = [fit.photos[view.photo.name].camera for view in views]
     units = fit_units(generic, fit.vertices)
     return fit, KnownHead(views, cameras, fit.vertices, units.astype(np.float64), generic)
+
+
+def _with_turned_over(capture: Capture, neutral: NeutralFit) -> Capture:
+    """The capture with mirrored photos as their cameras see them."""
+    turned = {view.photo.name: view for view in neutral.turned_over}
+    views = tuple(turned.get(view.photo.name, view) for view in capture.expressions[NEUTRAL])
+    return replace(capture, expressions={**capture.expressions, NEUTRAL: views})
 
 
 def _fit_expressions(

@@ -17,6 +17,7 @@ from mien.head import Verdict
 from mien.progress import StepProgress
 from mien.reconstruction.features import gather_features
 from mien.reconstruction.landmark_fit import FitOptions, Solution, residuals_of, solve_by_features
+from mien.reconstruction.mirroring import find_mirrored, is_suspicious, mirrored_view
 from mien.reconstruction.outliers import (
     INCONSISTENT_SIGMAS,
     classify_marks,
@@ -38,6 +39,7 @@ __all__ = ["FitOptions", "NeutralFit", "fit_views"]
 MIN_VIEW_ANGLE_DEG = 10.0
 """Photos whose viewing directions, from landmarks alone, differ by less do not determine depth."""
 SAME_SIDE = "it looks from the same side as {}, and would only blur what that one shows"
+MIRRORED = "{}: was mirrored, as front cameras do; it is turned back"
 WRONG_FOCAL = (
     "{}: the focal length that the file states does not fit the photos, and is not used; was it "
     "cropped after it was taken?"
@@ -115,6 +117,14 @@ def _fit_views(
         left_out |= solution.problems
     else:
         left_out |= {view.photo.name: NO_FACE_FOUND for view in faceless}
+    turned = _turned_over(solution, generic) if len(solution.views) > 2 else None
+    if turned is not None:
+        views = [turned if view.photo.name == turned.photo.name else view for view in views]
+        fit, doubted = _fit_views(views, generic, options, progress)
+        note = MIRRORED.format(turned.photo.name)
+        return replace(
+            fit, notes=(note, *fit.notes), turned_over=(*fit.turned_over, turned)
+        ), doubted
     verdict = _verdict(solution, generic)
     if options.adjust:
         solution = _with_aligned_features(solution, generic)
@@ -136,6 +146,14 @@ def _fit_views(
         registered=bool(solution.matches),
     )
     return fit, solution.focal_doubts
+
+
+def _turned_over(solution: Solution, generic: GenericHead) -> CapturedView | None:
+    """A photo that was mirrored, the right way round."""
+    if not is_suspicious([count for count, _ in solution.matches]):
+        return None
+    found = find_mirrored(solution.views, solution.cameras, solution.vertices, generic)
+    return None if found is None else mirrored_view(solution.views[found], generic)
 
 
 def _verdict(solution: Solution, generic: GenericHead) -> Verdict:

@@ -8,6 +8,7 @@ import numpy as np
 
 from mien.arrays import Array, Float
 from mien.camera import Camera
+from mien.capture.source import CapturedView
 from mien.head import Verdict
 
 
@@ -99,11 +100,13 @@ class NeutralFit(Fit):
         uncertainty_mm: (V,) standard deviation of each vertex, all axes together.
         verdict: how far it is to be believed.
         registered: whether its photos were registered by all the skin that they share.
+        turned_over: photos that were mirrored, the right way round, as their cameras see them.
     """
 
     uncertainty_mm: Float[Array, " v"]
     verdict: Verdict
     registered: bool
+    turned_over: tuple[CapturedView, ...] = ()
 
     @property
     def is_plausible(self) -> bool:

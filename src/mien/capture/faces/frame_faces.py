@@ -12,7 +12,8 @@ from mien.capture.images.photos import downscale
 _AROUND = 1.5
 """Where a face was is looked for it within so many of its widths to each side."""
 _SEARCH_EVERY = 8
-"""Of frames in a row without a face, so many are searched in full, which takes ten times as long."""
+"""Of frames in a row without a face, one in so many is searched in full: that takes ten times as
+long."""
 
 
 class FrameFaces:
