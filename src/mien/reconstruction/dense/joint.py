@@ -149,8 +149,8 @@ def reprojection(problem: BundleProblem, state: BundleState) -> Reprojection:
     residuals = projection.image_points - problem.image
     squared = (residuals**2).sum(axis=1)
     variance, matches = problem.observations.sigma_px**2, problem.observations.for_cameras
-    noise = noise_variance(np.sqrt(squared / variance)[matches], len(state.points))
-    weights = 1 / (variance * np.where(matches, noise, 1.0) + squared)
+    noise = noise_factor(np.sqrt(squared / variance)[matches])
+    weights = 1 / (variance * np.where(matches, noise**2, 1.0) + squared)
     return Reprojection(projection, residuals, weights)
 
 

@@ -80,7 +80,10 @@ def assess_registration(
 ) -> RegistrationQuality:
     """From the last joint solution and the tracks it rests on."""
     photos = len(solution.cameras)
-    off = solution.normalized_residuals[: len(tracks.photo)]
+    # By the errors of single matches, whatever noise the solution had to allow for.
+    sigma_px = tracks.sigma_px * np.sqrt(tracks.overlap)[tracks.point]
+    allowed = solution.problem.observations.sigma_px[: len(tracks.photo)]
+    off = solution.normalized_residuals[: len(tracks.photo)] * allowed / sigma_px
     wrong = off > _WRONG_SIGMAS * noise_factor(off)
     masks = np.stack([generic.regions[name] for name in REGIONS], axis=-1)
     inside = tracks.on(masks)[tracks.point] > 0.5
@@ -92,7 +95,6 @@ def assess_registration(
                 outlier_fraction[k, r] = wrong[here].mean()
     agreeing = tracks.photo[~wrong]
     shared = np.bincount(agreeing, minlength=photos)
-    sigma_px = tracks.sigma_px * np.sqrt(tracks.overlap)[tracks.point]
     squares = (off * sigma_px)[~wrong] ** 2
     mean = np.bincount(agreeing, squares, minlength=photos) / np.maximum(shared, 1)
     return RegistrationQuality(

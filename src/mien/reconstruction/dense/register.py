@@ -18,7 +18,12 @@ from mien.reconstruction.bundle.problem import FocalGroups, Observations, PointP
 from mien.reconstruction.bundle.projection import POSE_SIZE
 from mien.reconstruction.dense.crops import finest_mm_per_px, visible_mesh
 from mien.reconstruction.dense.eyeballs import fit_eyeballs
-from mien.reconstruction.dense.joint import INDEPENDENT_POINTS, JointSolution, solve_jointly
+from mien.reconstruction.dense.joint import (
+    INDEPENDENT_POINTS,
+    JointSolution,
+    noise_variance,
+    solve_jointly,
+)
 from mien.reconstruction.dense.prior import HeadPrior, load_head_prior
 from mien.reconstruction.dense.quality import (
     MIN_SHARED_POINTS,
@@ -201,7 +206,17 @@ class _Problem:
         return known & (off > np.maximum(MIN_FOCAL_DOUBT, 3 * np.sqrt(variance)))
 
     def solve(self, state: _State, tracks: Tracks) -> JointSolution:
-        """Tracks and features together: points on the mesh, what photos show of them, prior."""
+        """Tracks and features together: points on the mesh, what photos show of them, prior.
+
+        Solved twice where the photos contradict each other: what is left of that in the solution
+        that follows them most closely says how far they can be followed at all.
+        """
+        closest = self._solve(state, tracks, 1.0)
+        matches = closest.normalized_residuals[: len(tracks.photo)]
+        variance = noise_variance(matches, len(tracks.corners))
+        return closest if variance == 1 else self._solve(state, tracks, np.sqrt(variance))
+
+    def _solve(self, state: _State, tracks: Tracks, noise: float) -> JointSolution:
         features, prior = self.features, self.prior
         photo, feature = np.nonzero(features.observed)
         by_hand = features.by_hand[photo, feature]
@@ -217,7 +232,7 @@ class _Problem:
             image_points=np.concatenate(
                 [tracks.image_points, features.image_points[photo, feature]]
             ),
-            sigma_px=np.append(tracks.sigma_px * overlap, sigma),
+            sigma_px=np.append(noise * tracks.sigma_px * overlap, sigma),
             for_cameras=np.append(np.ones(len(tracks.photo), bool), leading),
         )
 
