@@ -106,7 +106,8 @@ def registered_beside(start: Solution, mm: float) -> Registration:
         rms_px=nothing,
     )
     vertices = start.vertices + np.array([mm, 0, 0])
-    return Registration(start.cameras, vertices, np.full(len(vertices), 0.3), quality)
+    doubts = np.zeros(len(nothing), bool)
+    return Registration(start.cameras, vertices, np.full(len(vertices), 0.3), quality, doubts)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.8, 1.02])
@@ -123,7 +124,8 @@ def test_a_head_that_the_landmarks_contradict_is_refused(
     monkeypatch.setattr(registration, "register_views", lambda *known, **options: found)
     result = register_solution(start, [], GENERIC)
     if share > 1:
-        assert result.notes == (INCONSISTENT_REGISTRATION,)
+        why = "what would follow contradicts the landmarks"
+        assert result.notes == (INCONSISTENT_REGISTRATION.format(why),)
         assert result.matches == ()
         np.testing.assert_array_equal(result.vertices, start.vertices)
         assert (result.uncertainty_mm > found.deviation_mm).all()

@@ -35,6 +35,8 @@ def report_input() -> ReportInput:
         {**fit.photos, NAMES[0]: PhotoFit(photo.camera, marks)},
         fit.left_out,
         uncertainty_mm=fit.uncertainty_mm,
+        verdict=fit.verdict,
+        registered=fit.registered,
     )
     head = Head(
         subject="Zoë <script>",

@@ -26,7 +26,7 @@ from mien.reconstruction.outliers import (
     largest_view_angle,
     name_notes,
 )
-from mien.reconstruction.plausibility import edge_residual, judge, measure_oddness
+from mien.reconstruction.plausibility import edge_residual, is_head, judge
 from mien.reconstruction.registration import register_solution
 from mien.reconstruction.result import NeutralFit, PhotoFit
 from mien.reconstruction.shape.deformation import eye_centers
@@ -158,11 +158,12 @@ def _turned_over(solution: Solution, generic: GenericHead) -> CapturedView | Non
 
 def _verdict(solution: Solution, generic: GenericHead) -> Verdict:
     """Of the solution before its features and outline are fitted, which move what they must."""
+    registered, model = bool(solution.matches), shape_model(solution.views, generic)
     return judge(
         solution.cameras,
-        measure_oddness(solution.vertices, shape_model(solution.views, generic), generic),
         edge_residual(solution.features, solution.cameras, solution.residuals),
-        registered=bool(solution.matches),
+        head=is_head(solution.vertices, model, solution.features, generic, registered=registered),
+        registered=registered,
         doubts=solution.notes if solution.matches else (),
     )
 
@@ -202,7 +203,9 @@ def _with_aligned_features(solution: Solution, generic: GenericHead) -> Solution
     vertices = align_features(
         solution.vertices, features, cameras, generic, measured=bool(solution.matches)
     )
-    vertices = fit_outline(vertices, solution.views, cameras, generic)
+    vertices = fit_outline(
+        vertices, solution.views, cameras, generic, measured=bool(solution.matches)
+    )
     residuals = residuals_of(features, cameras, vertices)
     return replace(solution, vertices=vertices, residuals=residuals)
 

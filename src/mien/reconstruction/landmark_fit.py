@@ -36,8 +36,8 @@ NAMED_SIGMA_MM = 2.0
 faces and between people who mark them (docs/method/cameras.md)."""
 ATTACHED_SIGMA_MM = 1.5
 """The same for a landmark: the detector that finds it also attached it to the generic head."""
-DISTANCE_PRIOR = DistancePrior(900.0, 0.6)
-"""From where people are photographed: between a selfie's 40 cm and a portrait's 2 m."""
+DISTANCE_PRIOR = DistancePrior(900.0, 1.0)
+"""From where people are photographed: between a selfie's 35 cm and a portrait's 2.4 m."""
 MIN_DISTANCE_MM = 150.0
 """No photo of a face is taken from nearer to the eyes; a camera there is a diverged solution."""
 PRIOR_DEVIATION_MM = 2.5

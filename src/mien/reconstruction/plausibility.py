@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,46 +16,30 @@ from mien.reconstruction.features import Features
 from mien.reconstruction.outliers import MIN_PARALLAX_DEG, largest_view_angle
 from mien.reconstruction.shape.model import ShapeModel
 
-MAX_IDENTITY, MAX_DEVIATION = 0.78, 0.6
-"""Root mean square of a head's coefficients in the prior, of identity and of smooth deviations.
-Registered heads have at most 0.6 and 0.5; those of unlike photos, and of two people in one folder,
-0.9 to 1.3 and 0.6 to 1.5."""
-WORN_OUT = 1.35
-"""Times these limits at which a head that rests on landmarks is no head any more: nothing else
-corrects them."""
+MAX_ODDNESS = 0.6
+"""Registered heads have 0.4 to 0.53, people drawn from the identity basis 0.45; photos of two
+people 0.8 and more, of one on different days, or with a wrong focal length, 0.62 to 1.1."""
+MAX_ODDNESS_BY_LANDMARKS = 0.4
+"""The same of a head that rests on landmarks alone: such have 0.1 to 0.27."""
 DISTANCES_MM = (200.0, 20_000.0)
 """From where faces are photographed, a selfie at arm's length to a telephoto lens."""
 MAX_EDGE_RESIDUAL = 1.5
 """Expected errors by which the landmarks on edges lie off in the median. Registered heads have 0.4
 to 0.7; one that has followed noise had 2.4."""
+MARKED = 2.0
+"""Times these limits where marks were made by hand, through which the head passes whatever they
+mean."""
 _PRECISION_MM = 1.0
 _EVERY = 3
 """Of the face's vertices, so many are enough."""
 
 
-@dataclass(frozen=True)
-class Oddness:
-    """How unlikely a face's shape is.
-
-    Attributes:
-        identity: root mean square of its coefficients in the identity basis; 1 is usual of people
-            drawn from it, 0.5 of what photos tell of them.
-        deviation: the same of smooth deviations from the basis.
-    """
-
-    identity: float
-    deviation: float
-
-    def exceeds(self, factor: float = 1.0) -> bool:
-        """Whether it is beyond `factor` times what registered heads have."""
-        limits = factor * MAX_IDENTITY, factor * MAX_DEVIATION
-        return self.identity > limits[0] or self.deviation > limits[1]
-
-
 def measure_oddness(
     vertices: Float[Array, "v 3"], model: ShapeModel, generic: GenericHead
-) -> Oddness:
-    """Of the face, after the similarity that brings it to the model's mean; expressions are free.
+) -> float:
+    """How unlikely the shape of a face is: the root mean square of its coefficients in the prior.
+
+    After the similarity that brings it to the model's mean; expressions count nothing.
 
     Args:
         vertices: (V, 3) mm.
@@ -72,9 +55,29 @@ def measure_oddness(
     aligned = estimate_similarity(vertices[face], model.mean[face])(vertices[face])
     offsets = (aligned - model.mean[face]).ravel() / _PRECISION_MM
     coefficients = np.linalg.solve(basis.T @ basis + np.eye(basis.shape[1]), basis.T @ offsets)
-    identity = coefficients[:count]
-    deviation = coefficients[count : len(prior.components)]
-    return Oddness(*(float(np.sqrt(np.mean(part**2))) for part in (identity, deviation)))
+    return float(np.sqrt(np.mean(coefficients[: len(prior.components)] ** 2)))
+
+
+def is_head(
+    vertices: Float[Array, "v 3"],
+    model: ShapeModel,
+    features: Features,
+    generic: GenericHead,
+    *,
+    registered: bool,
+) -> bool:
+    """Whether a face is one that people have.
+
+    Args:
+        vertices: (V, 3) mm.
+        model: of what the photos may show.
+        features: that it was fitted to.
+        generic: the generic head.
+        registered: whether the photos were registered by all the skin that they share.
+    """
+    limit = MAX_ODDNESS if registered else MAX_ODDNESS_BY_LANDMARKS
+    limit *= MARKED if features.by_hand.any() else 1.0
+    return measure_oddness(vertices, model, generic) < limit
 
 
 def edge_residual(
@@ -101,9 +104,9 @@ def distance_problems(cameras: Sequence[Camera]) -> tuple[str, ...]:
 
 def judge(
     cameras: Sequence[Camera],
-    oddness: Oddness,
     edge: float,
     *,
+    head: bool,
     registered: bool,
     doubts: Sequence[str] = (),
 ) -> Verdict:
@@ -111,13 +114,13 @@ def judge(
 
     Args:
         cameras: of the photos that were used.
-        oddness: of the head.
         edge: as edge_residual.
+        head: whether the face is one that people have.
         registered: whether the photos were registered by all the skin that they share.
         doubts: what else speaks against it being good.
     """
     poor = [*distance_problems(cameras)]
-    if oddness.exceeds(1.0 if registered else WORN_OUT):
+    if not head:
         poor.append("the shape is none that heads have")
     if edge > MAX_EDGE_RESIDUAL:
         poor.append("the features of the face lie far from where the photos show them")

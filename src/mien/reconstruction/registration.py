@@ -28,7 +28,7 @@ from mien.reconstruction.plausibility import (
     MAX_EDGE_RESIDUAL,
     distance_problems,
     edge_residual,
-    measure_oddness,
+    is_head,
 )
 from mien.reconstruction.shape.model import shape_model
 
@@ -139,7 +139,7 @@ def _problems(
     if edge_residual(solution.features, found.cameras, residuals) > MAX_EDGE_RESIDUAL:
         problems.append("what would follow contradicts the landmarks")
     model = shape_model(solution.views, generic)
-    if measure_oddness(found.vertices, model, generic).exceeds():
+    if not is_head(found.vertices, model, solution.features, generic, registered=True):
         problems.append("what would follow is no head")
     return problems
 

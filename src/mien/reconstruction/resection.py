@@ -15,6 +15,9 @@ from mien.reconstruction.features import Features
 MIN_FEATURES = 4
 """With fewer, several cameras would do."""
 
+MAX_MISFIT = 0.5
+"""Of the points' extent in the photo: farther off, they are not seen at all."""
+
 
 def resect_cameras(
     views: Sequence[CapturedView],
@@ -60,7 +63,11 @@ def _resect(
             )
         except cv2.error:  # Points that lie in one place.
             continue
-        if solved and translation[2, 0] > 0:
-            rotation, _ = cv2.Rodrigues(rotation_vector)
-            return Camera(width, height, focal_px, rotation, translation.ravel())
+        if not solved or translation[2, 0] <= 0:
+            continue
+        rotation, _ = cv2.Rodrigues(rotation_vector)
+        camera = Camera(width, height, focal_px, rotation, translation.ravel())
+        off = np.linalg.norm(camera.project(points) - image, axis=1)
+        if np.median(off) < MAX_MISFIT * np.linalg.norm(image.std(axis=0)):
+            return camera
     raise EstimationError(f"{view.photo.name}: no camera sees its points so")

@@ -278,7 +278,9 @@ def camera_prior(
     deviation = np.full(POSE_SIZE, np.inf)
     if distance is None:
         return CameraPrior(arrays.R, arrays.t, groups, deviation)
-    deviation[-1] = distance.deviation
+    # What is known of one distance is known of all: photos of one person share photographer and
+    # lens, and many of them know no more than one.
+    deviation[-1] = distance.deviation * np.sqrt(len(cameras))
     mean = np.column_stack([arrays.t[:, :2], np.full(len(cameras), distance.median_mm)])
     return CameraPrior(arrays.R, mean, groups, deviation)
 

@@ -12,8 +12,9 @@ from mien.assets.generic import GenericHead
 from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
 from mien.capture.source import CapturedView
 
-UNIT_SD = 0.25
-"""Standard deviation of a unit's weight from the detector's score."""
+UNIT_SD, UNIT_SD_PER_SCORE = 0.05, 0.3
+"""Standard deviation of a unit's weight from the detector's score: of a score of 0, and what is
+added for a score of 1. What the detector does not see is hardly there."""
 _UNOBSERVED = ("eyeLook", "tongueOut")
 """Units without landmarks."""
 
@@ -54,8 +55,9 @@ def shape_model(views: Sequence[CapturedView], generic: GenericHead) -> ShapeMod
     scores = dict(zip(BLENDSHAPE_NAMES, np.mean(found, axis=0), strict=True))
     used = [k for k, name in enumerate(generic.unit_names) if not name.startswith(_UNOBSERVED)]
     expected = np.array([scores[generic.unit_names[k]] for k in used])
+    deviation = UNIT_SD + UNIT_SD_PER_SCORE * expected
     units = generic.unit_offsets[used]
     return ShapeModel(
         generic.mesh.vertices + np.tensordot(expected, units, 1),
-        np.concatenate([generic.identity.components, UNIT_SD * units]),
+        np.concatenate([generic.identity.components, deviation[:, None, None] * units]),
     )

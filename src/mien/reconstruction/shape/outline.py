@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from mien.arrays import Array, Bool, Float, Int, UInt8
 from mien.assets.generic import GenericHead
-from mien.assets.landmark_sets import FACE_OVAL
+from mien.assets.landmark_sets import FACE_OVAL, LANDMARK_COUNT, ON_EDGES
 from mien.camera import Camera
 from mien.capture.person_mask import PersonMask, find_person
 from mien.capture.source import CapturedView
@@ -26,8 +26,9 @@ from mien.reconstruction.shape.deformation import with_round_eyes
 ROUNDS = 6
 OUTWARD_MM, INWARD_MM = 60.0, 15.0
 """How far from the drawn outline that of the person is looked for, where there may be hair."""
-BARE_MM = 12.0
-"""The same outward where skin must be seen: on cheeks and jaw, beside which hair may hang."""
+SKIN_OUTWARD_MM, SKIN_INWARD_MM = 12.0, 6.0
+"""The same on cheeks and jaw, where it is the edge of the skin: hair may hang beside them. A beard
+reaches farther in."""
 REACH_MM = (8.0, 28.0)
 """Skin nearer than this to a landmark is known by it, skin farther by its outline."""
 BENDING = 2e3
@@ -50,6 +51,8 @@ def fit_outline(
     views: Sequence[CapturedView],
     cameras: Sequence[Camera],
     generic: GenericHead,
+    *,
+    measured: bool,
 ) -> Float[Array, "v 3"]:
     """The head with the outline that its photos show.
 
@@ -62,8 +65,9 @@ def fit_outline(
         views: K photos.
         cameras: of the photos.
         generic: the generic head.
+        measured: the face is known from several photos, also where it has no features, and stays.
     """
-    problem = _OutlineProblem.of(generic, vertices)
+    problem = _OutlineProblem.of(generic, vertices, measured)
     people = [_person(view, camera, vertices) for view, camera in zip(views, cameras, strict=True)]
     moved = vertices
     for _ in range(ROUNDS):
@@ -103,13 +107,16 @@ class _OutlineProblem:
     skin: Int[Array, "f 3"]
 
     @classmethod
-    def of(cls, generic: GenericHead, vertices: Float[Array, "v 3"]) -> _OutlineProblem:
+    def of(
+        cls, generic: GenericHead, vertices: Float[Array, "v 3"], measured: bool
+    ) -> _OutlineProblem:
         """For a head with these vertices."""
         from scipy.sparse import diags_array
 
-        landmarks = generic.landmark_positions(vertices)[
-            generic.landmark_attached & ~np.isin(np.arange(478), list(FACE_OVAL))
-        ]
+        numbers = np.arange(LANDMARK_COUNT)
+        known = set(range(LANDMARK_COUNT)) - FACE_OVAL if measured else ON_EDGES
+        steady = np.isin(numbers, list(known))
+        landmarks = generic.landmark_positions(vertices)[generic.landmark_attached & steady]
         distance = cKDTree(landmarks).query(vertices)[0]
         near, far = REACH_MM
         free = np.clip((distance - near) / (far - near), 0, 1)
@@ -171,13 +178,12 @@ def _targets(
     )
     within = ((places > 0) & (places < [camera.width, camera.height])).all(axis=2)
     alpha = person.at(places.reshape(-1, 2)).reshape(places.shape[:2])
+    bare = ~problem.hair[rim]
+    alpha[bare] *= _skin(view.photo.pixels, places[bare], mesh, camera)
     distances = _edge(alpha, steps)
     column = np.clip(np.searchsorted(steps, distances), 0, len(steps) - 1)
     known = np.isfinite(distances) & within[np.arange(len(rim)), column]
-    bare = ~problem.hair[rim]
-    known[bare] &= distances[bare] < BARE_MM
-    skin = _is_skin(view.photo.pixels, places, steps, distances, mesh, camera)
-    known[bare] &= skin[bare]
+    known[bare] &= (distances[bare] < SKIN_OUTWARD_MM) & (distances[bare] > -SKIN_INWARD_MM)
     # Along the normal in space a step looks shorter in the photo.
     return rim[known], (distances / np.maximum(length, 0.5))[known]
 
@@ -223,27 +229,19 @@ def _edge(alpha: Float[Array, "r s"], steps: Float[Array, " s"]) -> Float[Array,
     return distances
 
 
-def _is_skin(
-    photo: UInt8[Array, "h w 3"],
-    places: Float[Array, "r s 2"],
-    steps: Float[Array, " s"],
-    distances: Float[Array, " r"],
-    mesh: Mesh,
-    camera: Camera,
-) -> Bool[Array, " r"]:
-    """Whether what lies between the drawn outline and the person's has the colour of the face.
+def _skin(
+    photo: UInt8[Array, "h w 3"], places: Float[Array, "r s 2"], mesh: Mesh, camera: Camera
+) -> Float[Array, "r s"]:
+    """1 where a place has the colour of the face, 0 where it does not, smoothed along the steps."""
+    from scipy.ndimage import uniform_filter1d
 
-    Always true where the person's outline is the inner one.
-    """
-    between = (steps > 0) & (steps <= np.nan_to_num(distances)[:, None])
-    strip = _colours(photo, places.reshape(-1, 2)).reshape(*places.shape[:2], 3)
     facing = mesh.vertex_normals() @ (camera.center / np.linalg.norm(camera.center)) > 0.6
     face = _colours(photo, camera.project(mesh.vertices[facing & (mesh.vertices[:, 2] > 0)]))
     centre = np.median(face, axis=0)
     spread = 1.5 * np.median(np.abs(face - centre), axis=0) + 4
-    off = np.abs(strip - centre) / spread
-    different = (off.max(axis=2) > _SKIN_SIGMAS) & between
-    return different.sum(axis=1) <= 0.3 * between.sum(axis=1)
+    strip = _colours(photo, places.reshape(-1, 2)).reshape(*places.shape[:2], 3)
+    alike = (np.abs(strip - centre) / spread).max(axis=2) < _SKIN_SIGMAS
+    return uniform_filter1d(alike.astype(float), 3, axis=1)
 
 
 def _colours(photo: UInt8[Array, "h w 3"], places: Float[Array, "n 2"]) -> Float[Array, "n 3"]:
