@@ -41,6 +41,7 @@ def test_smiles_and_speech_are_no_part_of_the_face_at_rest() -> None:
         "a, e: another expression than the photos of the face at rest; kept as smile",
         "c: another expression than the photos of the face at rest; kept as open_mouth",
     )
+    assert sorting_notes(found, kept=False)[1].endswith("of the face at rest; left out")
 
 
 def test_scores_that_differ_as_they_do_between_cameras_are_one_expression() -> None:

@@ -63,11 +63,18 @@ def sort_by_expression(
     }
 
 
-def sorting_notes(sorted_views: dict[str, tuple[CapturedView, ...]]) -> tuple[str, ...]:
-    """For the user: which photos show another expression than the face at rest."""
+def sorting_notes(
+    sorted_views: dict[str, tuple[CapturedView, ...]], *, kept: bool = True
+) -> tuple[str, ...]:
+    """For the user: which photos show another expression than the face at rest.
+
+    Args:
+        sorted_views: as sort_by_expression returns them.
+        kept: whether they become expressions of their own.
+    """
     return tuple(
         f"{', '.join(view.photo.name for view in views)}: another expression than the photos of "
-        f"the face at rest; kept as {name}"
+        f"the face at rest; {f'kept as {name}' if kept else 'left out'}"
         for name, views in sorted_views.items()
         if name != NEUTRAL
     )

@@ -98,7 +98,8 @@ def build(
         str | None,
         typer.Option(
             metavar="N|none",
-            help="How many expressions to pick from a video; whatever differs by default.",
+            help="How many expressions to pick from a video or, none, whether to keep those of "
+            "photos that show others; whatever differs by default.",
         ),
     ] = None,
     json_: Json = False,

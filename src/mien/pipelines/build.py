@@ -51,7 +51,7 @@ class BuildOptions:
         face: which face where a photo shows several.
         frames: how many frames of the face at rest to pick from a video.
         expressions: how many other expressions to pick from a video; None takes what differs, 0
-            neutral alone.
+            neutral alone, also of a folder of photos that show different ones.
     """
 
     fit: FitOptions = field(default_factory=FitOptions)
@@ -157,13 +157,14 @@ def _load_capture(source: str | Path, options: BuildOptions, progress: StepProgr
         raise EstimationError(f"{source}: no photo in {NEUTRAL} shows a face that can be used")
     if list(capture.expressions) != [NEUTRAL]:
         return _named_by_expression(capture)
-    return _sorted(capture)
+    return _sorted(capture, options.expressions != 0)
 
 
-def _sorted(capture: Capture) -> Capture:
-    """Photos from life in one folder: those of another expression are no part of neutral."""
+def _sorted(capture: Capture, others: bool) -> Capture:
+    """Photos from life in one folder: those of other expressions are no part of neutral."""
     found = sort_by_expression(capture.expressions[NEUTRAL])
-    return replace(capture, expressions=found, notes=(*capture.notes, *sorting_notes(found)))
+    notes = (*capture.notes, *sorting_notes(found, kept=others))
+    return replace(capture, expressions=found if others else {NEUTRAL: found[NEUTRAL]}, notes=notes)
 
 
 def _fit_neutral(
