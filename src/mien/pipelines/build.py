@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from mien.assets.generic import GenericHead, load_generic_head
 from mien.capture.annotations import save_annotations
 from mien.capture.folder import photo_files
 from mien.capture.photo_sorting import sort_by_expression, sorting_notes
-from mien.capture.source import Capture, load_capture
+from mien.capture.source import Capture, CapturedView, load_capture
 from mien.errors import EstimationError
 from mien.head import ATLAS, NEUTRAL, Expression, FittedView, Head
 from mien.io.files.manifest import kept_notes
@@ -25,6 +25,7 @@ from mien.reconstruction.expression.fit import fit_expression
 from mien.reconstruction.expression.known_head import KnownHead
 from mien.reconstruction.fit import FitOptions, fit_views
 from mien.reconstruction.result import ExpressionFit, Fit, NeutralFit
+from mien.reconstruction.shared_skin import find_other_people
 from mien.render.picture import turntable_frames
 from mien.report import ReportInput, render_report
 from mien.rig.contacts.lips import close_lips
@@ -205,8 +206,27 @@ def _fit_expressions(
             notes.append(f"{name}: left out: {error}")
             continue
         fits[name] = replace(fit, vertices=contacts.resolve(fit.vertices))
+        notes += _strangers(views, fit, known)
     progress(len(capture.expressions), len(capture.expressions))
     return fits, notes
+
+
+def _strangers(
+    views: Sequence[CapturedView], fit: ExpressionFit, known: KnownHead
+) -> tuple[str, ...]:
+    """Notes on photos of an expression that hardly show the person; frames of one clip do."""
+    first, camera = known.views[0], known.cameras[0]
+    used = [view for view in views if view.photo.name in fit.photos]
+    pairs = [
+        ((first, view), (camera, fit.photos[view.photo.name].camera))
+        for view in used
+        if view.photo.path != first.photo.path
+    ]
+    return tuple(
+        note
+        for pair, cameras in pairs
+        for note in find_other_people(pair, cameras, known.vertices, known.generic)
+    )
 
 
 def _part(number: int, capture: Capture, progress: StepProgress) -> StepProgress:

@@ -33,6 +33,7 @@ from mien.reconstruction.shape.deformation import eye_centers
 from mien.reconstruction.shape.feature_alignment import align_features
 from mien.reconstruction.shape.model import shape_model
 from mien.reconstruction.shape.outline import fit_outline
+from mien.reconstruction.shared_skin import ANOTHER_PERSON, find_other_people
 
 __all__ = ["FitOptions", "NeutralFit", "fit_views"]
 
@@ -112,6 +113,7 @@ def _fit_views(
         worst, why = outlier
         left_out[solution.views[worst].photo.name] = why
         marked = [view for k, view in enumerate(solution.views) if k != worst]
+    together = solution
     if options.dense and options.adjust:
         solution = _registered(solution, faceless, generic, options, progress)
         left_out |= solution.problems
@@ -125,6 +127,9 @@ def _fit_views(
         return replace(
             fit, notes=(note, *fit.notes), turned_over=(*fit.turned_over, turned)
         ), doubted
+    if options.dense and not solution.matches and len(together.views) > 1:
+        found = find_other_people(together.views, together.cameras, together.vertices, generic)
+        solution = replace(solution, notes=(*found, *solution.notes))
     verdict = _verdict(solution, generic)
     if options.adjust:
         solution = _with_aligned_features(solution, generic)
@@ -165,6 +170,7 @@ def _verdict(solution: Solution, generic: GenericHead) -> Verdict:
         head=is_head(solution.vertices, model, solution.features, generic, registered=registered),
         registered=registered,
         doubts=solution.notes if solution.matches else (),
+        contradictions=[note for note in solution.notes if ANOTHER_PERSON[3:20] in note],
     )
 
 

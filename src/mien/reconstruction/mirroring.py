@@ -14,9 +14,8 @@ from mien.camera import Camera
 from mien.capture.faces.mediapipe_face import BLENDSHAPE_NAMES
 from mien.capture.source import CapturedView
 from mien.mesh import Mesh
-from mien.numeric.rotation import angle_between
 from mien.reconstruction.dense.crops import visible_mesh
-from mien.reconstruction.dense.tracks import find_tracks
+from mien.reconstruction.shared_skin import count_shared, degrees_between
 
 MIRRORED_RATIO = 1.0
 """A photo that shares so many times the skin with the others when it is turned over was mirrored.
@@ -24,7 +23,6 @@ Faces are not symmetric: photos the right way round share 1.2 to 2.5 times more 
 SUSPICIOUS = 0.65
 """Share of what photos have in common with others, in the median, below which one is looked at."""
 _NEIGHBOURS = 2
-_MM_PER_PX, _POINTS = 1.2, 40_000
 _FLIP = np.diag([-1.0, 1.0, 1.0])
 
 
@@ -108,16 +106,8 @@ def _shared(
     mesh: Mesh,
 ) -> int:
     """How many points a photo shares with those that look from nearest to it."""
-    turns = [float(angle_between(camera.R_cam_head, cameras[j].R_cam_head)) for j in others]
-    nearest = [others[n] for n in np.argsort(turns)[:_NEIGHBOURS]]
-    return sum(
-        len(
-            find_tracks(
-                [view, views[j]], [camera, cameras[j]], mesh, mm_per_px=_MM_PER_PX, points=_POINTS
-            ).corners
-        )
-        for j in nearest
-    )
+    nearest = sorted(others, key=lambda j: degrees_between(camera, cameras[j]))[:_NEIGHBOURS]
+    return sum(count_shared((view, views[j]), (camera, cameras[j]), mesh) for j in nearest)
 
 
 def _landmark_partners(generic: GenericHead) -> Int[Array, " 478"]:

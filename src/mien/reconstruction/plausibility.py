@@ -109,6 +109,7 @@ def judge(
     head: bool,
     registered: bool,
     doubts: Sequence[str] = (),
+    contradictions: Sequence[str] = (),
 ) -> Verdict:
     """One grade for the whole solution, with the reasons.
 
@@ -118,8 +119,9 @@ def judge(
         head: whether the face is one that people have.
         registered: whether the photos were registered by all the skin that they share.
         doubts: what else speaks against it being good.
+        contradictions: what else speaks against believing it.
     """
-    poor = [*distance_problems(cameras)]
+    poor = [*contradictions, *distance_problems(cameras)]
     if not head:
         poor.append("the shape is none that heads have")
     if edge > MAX_EDGE_RESIDUAL:
