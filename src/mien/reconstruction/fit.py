@@ -210,7 +210,7 @@ def _with_aligned_features(solution: Solution, generic: GenericHead) -> Solution
         solution.vertices, features, cameras, generic, measured=bool(solution.matches)
     )
     vertices = fit_outline(
-        vertices, solution.views, cameras, generic, measured=bool(solution.matches)
+        vertices, solution.views, cameras, generic, measured=len(solution.views) > 1
     )
     residuals = residuals_of(features, cameras, vertices)
     return replace(solution, vertices=vertices, residuals=residuals)

@@ -29,8 +29,9 @@ OUTWARD_MM, INWARD_MM = 60.0, 15.0
 SKIN_OUTWARD_MM, SKIN_INWARD_MM = 12.0, 6.0
 """The same on cheeks and jaw, where it is the edge of the skin: hair may hang beside them. A beard
 reaches farther in."""
-REACH_MM = (8.0, 28.0)
-"""Skin nearer than this to a landmark is known by it, skin farther by its outline."""
+REACH_MM, MEASURED_REACH_MM = (8.0, 28.0), (16.0, 45.0)
+"""Skin nearer than this to a feature of the face is known by it, skin farther by its outline; and
+of a face that several photos have measured, to any landmark."""
 BENDING = 2e3
 """Weight (mm^2) of the squared mean bending of the movement against squared distances."""
 _SQUARE = 1.35
@@ -67,7 +68,7 @@ def fit_outline(
         views: K photos.
         cameras: of the photos.
         generic: the generic head.
-        measured: the face is known from several photos, also where it has no features, and stays.
+        measured: the face is known from several photos, also where it has no features.
     """
     problem = _OutlineProblem.of(generic, vertices, measured)
     people = [_person(view, camera, vertices) for view, camera in zip(views, cameras, strict=True)]
@@ -120,7 +121,7 @@ class _OutlineProblem:
         steady = np.isin(numbers, list(known))
         landmarks = generic.landmark_positions(vertices)[generic.landmark_attached & steady]
         distance = cKDTree(landmarks).query(vertices)[0]
-        near, far = REACH_MM
+        near, far = MEASURED_REACH_MM if measured else REACH_MM
         free = np.clip((distance - near) / (far - near), 0, 1)
         still = ("left_ear", "right_ear", "neck", "eye_socket", "mouth_cavity")
         free *= 1 - np.clip(sum(generic.regions[name] for name in still), 0, 1)
