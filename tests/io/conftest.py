@@ -13,7 +13,7 @@ import pytest
 
 from mien.assets.generic import load_generic_head
 from mien.camera import Camera
-from mien.head import Expression, FittedView, Head
+from mien.head import Expression, FittedView, Head, Verdict
 from mien.io.mesh.head_animation import HeadAnimation
 from mien.mesh import Mesh
 from mien.numeric.rotation import rotation_from_vector
@@ -77,6 +77,7 @@ def small_head() -> Head:
     return Head(
         subject="Zoë",
         mesh=mesh,
+        verdict=Verdict("fair", ("one photo", "and a “doubt”")),
         expressions={
             "neutral": Expression(vertices, views=(_view("front.png"), _view("side.jpg"))),
             "joy": Expression(smile, views=(_view("joy/front.heic"),), texture="joy"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,12 @@ from mien.head import Verdict
 from mien.progress import StepProgress
 from mien.reconstruction.features import gather_features
 from mien.reconstruction.landmark_fit import FitOptions, Solution, residuals_of, solve_by_features
-from mien.reconstruction.mirroring import find_mirrored, is_suspicious, mirrored_view
+from mien.reconstruction.mirroring import (
+    MIN_PHOTOS,
+    find_mirrored,
+    is_suspicious,
+    mirrored_view,
+)
 from mien.reconstruction.outliers import (
     INCONSISTENT_SIGMAS,
     classify_marks,
@@ -33,7 +38,7 @@ from mien.reconstruction.shape.deformation import eye_centers
 from mien.reconstruction.shape.feature_alignment import align_features
 from mien.reconstruction.shape.model import shape_model
 from mien.reconstruction.shape.outline import fit_outline
-from mien.reconstruction.shared_skin import ANOTHER_PERSON, find_other_people
+from mien.reconstruction.shared_skin import find_other_people
 
 __all__ = ["FitOptions", "NeutralFit", "fit_views"]
 
@@ -98,6 +103,25 @@ def _fit_views(
     progress: StepProgress | None,
 ) -> tuple[NeutralFit, Sequence[str]]:
     """The fit, and the photos whose stated focal length it contradicts."""
+    solution, left_out = _solve(views, generic, options, progress)
+    turned_over: dict[str, CapturedView] = {}
+    while (turned := _mirrored_photo(solution, turned_over, generic)) is not None:
+        turned_over[turned.photo.name] = turned
+        views = [turned_over.get(view.photo.name, view) for view in views]
+        solution, left_out = _solve(views, generic, options, progress)
+    fit = _finished(solution, left_out, generic, options)
+    notes = (*(MIRRORED.format(name) for name in turned_over), *fit.notes)
+    fit = replace(fit, notes=notes, turned_over=tuple(turned_over.values()))
+    return fit, solution.focal_doubts
+
+
+def _solve(
+    views: Sequence[CapturedView],
+    generic: GenericHead,
+    options: FitOptions,
+    progress: StepProgress | None,
+) -> tuple[Solution, dict[str, str]]:
+    """Cameras and shape, and why photos were left out, by name."""
     marked = [view for view in views if view.marked]
     faceless = [view for view in views if not view.marked]
     if not marked:
@@ -113,23 +137,32 @@ def _fit_views(
         worst, why = outlier
         left_out[solution.views[worst].photo.name] = why
         marked = [view for k, view in enumerate(solution.views) if k != worst]
-    together = solution
-    if options.dense and options.adjust:
-        solution = _registered(solution, faceless, generic, options, progress)
-        left_out |= solution.problems
-    else:
-        left_out |= {view.photo.name: NO_FACE_FOUND for view in faceless}
-    turned = _turned_over(solution, generic) if len(solution.views) > 2 else None
-    if turned is not None:
-        views = [turned if view.photo.name == turned.photo.name else view for view in views]
-        fit, doubted = _fit_views(views, generic, options, progress)
-        note = MIRRORED.format(turned.photo.name)
-        return replace(
-            fit, notes=(note, *fit.notes), turned_over=(*fit.turned_over, turned)
-        ), doubted
-    if options.dense and not solution.matches and len(together.views) > 1:
-        found = find_other_people(together.views, together.cameras, together.vertices, generic)
-        solution = replace(solution, notes=(*found, *solution.notes))
+    if not (options.dense and options.adjust):
+        return solution, left_out | {view.photo.name: NO_FACE_FOUND for view in faceless}
+    found = _registered(solution, faceless, generic, options, progress)
+    if not found.matches:
+        strangers = find_other_people(solution.views, solution.cameras, solution.vertices, generic)
+        found = replace(found, contradictions=strangers)
+    return found, left_out | found.problems
+
+
+def _mirrored_photo(
+    solution: Solution, turned_over: Mapping[str, CapturedView], generic: GenericHead
+) -> CapturedView | None:
+    """A photo that was mirrored and is not among those turned over, the right way round."""
+    shared = [count for count, _ in solution.matches]
+    if len(solution.views) < MIN_PHOTOS or not is_suspicious(shared):
+        return None
+    found = find_mirrored(solution.views, solution.cameras, solution.vertices, generic)
+    if found is None or solution.views[found].photo.name in turned_over:
+        return None
+    return mirrored_view(solution.views[found], generic)
+
+
+def _finished(
+    solution: Solution, left_out: dict[str, str], generic: GenericHead, options: FitOptions
+) -> NeutralFit:
+    """The solution with features and outline where photos show them, in head space."""
     verdict = _verdict(solution, generic)
     if options.adjust:
         solution = _with_aligned_features(solution, generic)
@@ -140,8 +173,8 @@ def _fit_views(
         marks = classify_marks(solution.features, k, solution.residuals[k], sigma_px[k])
         matches, rms_px = solution.matches[k] if solution.matches else (0, 0.0)
         photos[view.photo.name] = PhotoFit(camera, marks, matches, rms_px)
-    notes = (*depth_notes(cameras), *solution.notes, *name_notes(photos))
-    fit = NeutralFit(
+    notes = (*solution.contradictions, *depth_notes(cameras), *solution.notes, *name_notes(photos))
+    return NeutralFit(
         vertices,
         photos,
         left_out,
@@ -150,15 +183,6 @@ def _fit_views(
         verdict=verdict,
         registered=bool(solution.matches),
     )
-    return fit, solution.focal_doubts
-
-
-def _turned_over(solution: Solution, generic: GenericHead) -> CapturedView | None:
-    """A photo that was mirrored, the right way round."""
-    if not is_suspicious([count for count, _ in solution.matches]):
-        return None
-    found = find_mirrored(solution.views, solution.cameras, solution.vertices, generic)
-    return None if found is None else mirrored_view(solution.views[found], generic)
 
 
 def _verdict(solution: Solution, generic: GenericHead) -> Verdict:
@@ -170,7 +194,7 @@ def _verdict(solution: Solution, generic: GenericHead) -> Verdict:
         head=is_head(solution.vertices, model, solution.features, generic, registered=registered),
         registered=registered,
         doubts=solution.notes if solution.matches else (),
-        contradictions=[note for note in solution.notes if ANOTHER_PERSON[3:20] in note],
+        contradictions=solution.contradictions,
     )
 
 

@@ -85,6 +85,7 @@ class Solution:
         matches: by photo, count and RMS (px) of the points that it shares with others; () without
             registration.
         focal_doubts: photos whose stated focal length the others contradict.
+        contradictions: what speaks against its photos belonging together.
     """
 
     views: Sequence[CapturedView]
@@ -97,6 +98,7 @@ class Solution:
     notes: tuple[str, ...] = ()
     matches: tuple[tuple[int, float], ...] = ()
     focal_doubts: tuple[str, ...] = ()
+    contradictions: tuple[str, ...] = ()
 
     @property
     def median_normalized_residuals(self) -> Float[Array, " k"]:

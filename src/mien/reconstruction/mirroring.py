@@ -20,6 +20,8 @@ from mien.reconstruction.shared_skin import count_shared, degrees_between
 MIRRORED_RATIO = 1.0
 """A photo that shares so many times the skin with the others when it is turned over was mirrored.
 Faces are not symmetric: photos the right way round share 1.2 to 2.5 times more than turned over."""
+MIN_PHOTOS = 3
+"""Of two, nobody can say which one was mirrored."""
 SUSPICIOUS = 0.65
 """Share of what photos have in common with others, in the median, below which one is looked at."""
 _NEIGHBOURS = 2

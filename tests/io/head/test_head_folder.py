@@ -44,7 +44,7 @@ def saved(small_head: Head, tmp_path: Path) -> Path:
 
 def test_what_is_saved_round_trips(small_head: Head, saved: Path) -> None:
     loaded = load_head(saved)
-    for name in ("subject", "unit_names", "left_out", "generator"):
+    for name in ("subject", "unit_names", "left_out", "verdict", "generator"):
         assert getattr(loaded, name) == getattr(small_head, name)
     for name in ("vertices", "triangles", "uvs", "uv_triangles", "part"):
         np.testing.assert_array_equal(getattr(loaded.mesh, name), getattr(small_head.mesh, name))
@@ -87,7 +87,7 @@ def test_a_head_of_an_older_mien_loads(small_head: Head, tmp_path: Path) -> None
     save_head(expressive(small_head), tmp_path / "h")
 
     def age(data: dict[str, Any]) -> None:
-        del data["shading"]
+        del data["shading"], data["verdict"]
         for expression in data["expressions"].values():
             del expression["units"], expression["gaze_rad"]
             for camera in expression["cameras"]:
@@ -96,6 +96,7 @@ def test_a_head_of_an_older_mien_loads(small_head: Head, tmp_path: Path) -> None
     edit_json(tmp_path / "h", age)
     loaded = load_head(tmp_path / "h")
     assert loaded.shading == SHADING
+    assert loaded.verdict is None
     for expression in loaded.expressions.values():
         assert expression.units == {}
         np.testing.assert_array_equal(expression.gaze, np.zeros((2, 2)))
@@ -341,6 +342,11 @@ def test_a_truncated_file_is_named(saved: Path, file: str, message: str, keep: f
             r"shading\.eyes: expected 3 numbers, found 2",
         ),
         (lambda data: data["shading"].pop("teeth"), "shading.teeth: missing"),
+        (
+            lambda data: data["verdict"].update(grade="fine"),
+            r"verdict\.grade: unknown grade 'fine'",
+        ),
+        (lambda data: data["verdict"].pop("reasons"), "verdict.reasons: missing"),
         (
             lambda data: data["expressions"]["joy"]["cameras"][0].update(gains=[1, 0, 1]),
             "gains: expected numbers above 0",
